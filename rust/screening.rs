@@ -41,7 +41,7 @@ pub struct Jump {
     pub at: usize,
     /// Readings per mean.
     pub size: usize,
-    /// Later mean minus earlier.
+    /// Later mean minus earlier, beyond the usual change.
     pub difference: f64,
 }
 
@@ -81,23 +81,22 @@ fn at_scale(sums: &[f64], scale: Scale) -> Vec<Jump> {
         limit,
     } = scale;
     let count = (sums.len() - 1 - 2 * size) / stride + 1;
-    let difference = |i: usize| {
+    let change = |i: usize| {
         let k = i * stride;
         ((sums[k + 2 * size] - sums[k + size]) - (sums[k + size] - sums[k])) / size as f64
     };
-    let spread = spread(
-        (0..count)
-            .step_by((count / SAMPLE).max(1))
-            .map(difference)
-            .collect(),
-    );
+    let sample = (0..count).step_by((count / SAMPLE).max(1)).map(change);
+    let (usual, spread) = centre_and_spread(sample.collect());
+    // What a log in a steady drift changes by everywhere is no event.
+    let difference = |i: usize| change(i) - usual;
     let threshold = limit * spread;
     let apart = (2 * size / stride).max(1);
     let mut out: Vec<Jump> = Vec::new();
     let mut last = 0;
     // Almost every run of readings holds no event: its largest difference is found without a branch.
     let quiet = |first: usize, n: usize| {
-        stride == 1 && largest(&sums[first..], size, n) <= threshold * size as f64
+        let room = (threshold - usual.abs()) * size as f64;
+        stride == 1 && largest(&sums[first..], size, n) <= room
     };
     for i in (0..count)
         .step_by(RUN)
@@ -170,14 +169,14 @@ fn largest(sums: &[f64], m: usize, n: usize) -> f64 {
     most.into_iter().chain(rest).fold(0.0, f64::max)
 }
 
-/// Robust spread, and at least what one difference in a hundred requires: readings with long tails are noise, not
+/// Median and robust spread about it, at least what one difference in a hundred requires: readings with long tails are noise, not
 /// events, and counts that rarely change have a median of zero.
-fn spread(mut values: Vec<f64>) -> f64 {
-    let rms = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+fn centre_and_spread(mut values: Vec<f64>) -> (f64, f64) {
     let centre = median(&mut values);
     for v in &mut values {
         *v = (*v - centre).abs();
     }
+    let rms = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
     let mut spread = MAD_TO_SIGMA * median(&mut values);
     if values.len() >= 4096 {
         let rank = values.len() - values.len() / 100;
@@ -185,9 +184,9 @@ fn spread(mut values: Vec<f64>) -> f64 {
             .max(*values.select_nth_unstable_by(rank, f64::total_cmp).1 / TWO_SIDED_HUNDREDTH);
     }
     if spread > 0.0 {
-        spread
+        (centre, spread)
     } else {
-        rms.max(f64::MIN_POSITIVE)
+        (centre, rms.max(f64::MIN_POSITIVE))
     }
 }
 

@@ -317,3 +317,11 @@ def test_a_wave_of_few_periods_and_a_level_that_switches_are_named_and_no_walk_i
     if waves:
         assert waves[0].numbers["period_s"] == pytest.approx(n / RATE / 3.2, rel=0.05)
         assert "K" not in present(found.axes[0])
+
+
+def test_a_steady_drift_of_a_hundred_times_the_noise_has_no_jumps():
+    n = 360_000
+    x = 1e-3 * np.random.default_rng(1).normal(size=n) + 0.1 * np.arange(n) / n
+    (axis,) = identify_noise(x, rate_hz=100.0).axes
+    assert FindingCode.LOG_JUMP not in {one.code for one in axis.findings}
+    assert axis.terms[TermName.RATE_RAMP].estimate == pytest.approx(0.1 / 3600.0, rel=1e-3)
