@@ -146,14 +146,15 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
         extra: dict[str, Any] = {}
         curves: tuple[EffectCurve, ...] = ()
         if one.effect.walks:
-            path = model.fitted.bias(one.effect.sensor)
+            path = one.alone.fitted.bias(one.effect.sensor)
             extra["curve"] = {
                 "time_s": model.obs.pose_time_s.tolist(), "value": path.T.tolist(),
                 "sigma": [[float(s)] * model.obs.n_poses for s in one.std], "unit": one.effect.unit,
             }  # fmt: skip
             curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
         held = held_out_records(one.without, model)
-        rivals = tuple(other.term.effect.id for other in explain_as_much(one, model, answer.found.tried.values()))
+        as_much = explain_as_much(one, model, answer.found.tried.values())
+        rivals = (*one.rivals, *(other.term.effect.id for other in as_much))
         out.append(
             effect_record(
                 one.effect, one.parameters, one.statement, one.p_value, one.score, held, rivals, curves, **extra
@@ -221,7 +222,9 @@ def candidates(answer: Answer) -> tuple[Candidate, ...]:
         if key not in out or bias.score > (out[key].score or -np.inf):
             limit = bias.size + NORMAL_95 * bias.std
             reason = words("within-flicker") if bias.score > 0.0 and not bias.is_large else ""
-            out[key] = Candidate(key, bias.p_value, True, reason, bias.score, bias.parameters, float(np.max(limit)))
+            against = next((one.effect.id for one in answer.biases if key in one.rivals), None)
+            said = bias.score, bias.parameters, float(np.max(limit)), against
+            out[key] = Candidate(key, bias.p_value, True, reason, *said)
     for k, term in enumerate(found.model.terms):
         value, covariance = answer.numbers.value(k)
         size = term.effect.parameters(term.variant, value, covariance)

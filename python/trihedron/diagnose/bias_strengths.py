@@ -36,7 +36,8 @@ FLICKER_WITHIN = 1.5
 @dataclass(frozen=True, eq=False)
 class BiasStrength:
     """One bias process: ``gain`` in twice the log-evidence over its strength bounded to the part's noise, ``score`` the
-    gain less the penalty for further axes, ``size`` and ``std`` (3,) SI by axis."""
+    gain less the penalty for further axes, ``size`` and ``std`` (3,) SI by axis, those of the hypothesis ``alone``:
+    where the sensor's other process is not needed beside it, with that bounded."""
 
     effect: BiasProcess
     gain: float
@@ -46,10 +47,13 @@ class BiasStrength:
     parameters: tuple[EffectParameter, ...]
     statement: Words
     without: Hypothesis
+    alone: Hypothesis
     price: float
     """Selection penalty of a catalogue effect, in twice a log-likelihood; it applies to a named process too."""
     is_large: bool
     """Whether a drift exceeds that of 1/f noise (``LEAST_TIMES``)."""
+    rivals: tuple[str, ...] = ()
+    """The sensor's other process, where that explains as much."""
 
     @property
     def p_value(self) -> float:
@@ -64,18 +68,25 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
     limit = 2.0 * float(np.log((1.0 - alpha) / alpha))
     processes = [one for one in catalogue() if isinstance(one, BiasProcess) and one.id not in held]
     applying = [one for one in processes if one.unavailable(model.context) is None]
-    asked = {one.effect.id: one for one in side_by_side(lambda effect: _asked(model, effect), applying)}
+    bounded = side_by_side(lambda effect: again(model, model.terms, bounds_without(model, effect)), applying)
+    asked: dict[str, BiasStrength] = {}
+    for effect, without in zip(applying, bounded, strict=True):
+        # Drift and scatter can absorb each other: one that is not needed may hide the size of the other.
+        beside = (other for one, other in zip(applying, bounded, strict=True) if one.sensor == effect.sensor)
+        needless = [other for other in beside if other is not without and _gain(model, other) < NEAR]
+        asked[effect.id] = _strength(model, effect, without, *needless)
     named = [one for one in asked.values() if one.score > limit and one.is_large]
     for sensor in range(2):
         both = [one for one in asked.values() if one.effect.sensor == sensor and one.is_large]
         if len(both) == 2 and not any(one in named for one in both):
-            # Drift and scatter can absorb each other: bound both; where that is unlikely the likelier one is named.
+            # Neither is needed beside the other: bound both; where that is unlikely the likelier one is named.
             bounds = _bounded(model.obs, model.within, {(sensor, True), (sensor, False)})
             without = again(model, model.terms, bounds)
-            gain = 2.0 * (model.log_evidence - without.log_evidence)
+            gain = _gain(model, without)
             if gain > limit:
-                likelier = max(both, key=lambda one: one.gain)
-                named.append(replace(likelier, gain=gain, score=gain, without=without))
+                other, likelier = sorted(both, key=lambda one: one.gain)
+                named.append(replace(likelier, gain=gain, score=gain, without=without, rivals=(other.effect.id,)))
+                asked[other.effect.id] = _strength(model, other.effect, other.without, likelier.without)
     return sorted(named, key=lambda one: -one.gain), asked
 
 
@@ -103,10 +114,14 @@ def _bounded(obs: Observations, within: Bounds, which: Collection[tuple[int, boo
     return (corners[0], corners[1]), (scatters[0], scatters[1]), excess
 
 
-def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
-    without = again(model, model.terms, bounds_without(model, effect))
-    gain = 2.0 * (model.log_evidence - without.log_evidence)
-    size, std = _size(model, effect)
+def _gain(model: Hypothesis, without: Hypothesis) -> float:
+    return 2.0 * (model.log_evidence - without.log_evidence)
+
+
+def _strength(model: Hypothesis, effect: BiasProcess, without: Hypothesis, *needless: Hypothesis) -> BiasStrength:
+    """One process; ``needless`` is the hypothesis without the sensor's other one, where that is as likely."""
+    gain, alone = _gain(model, without), next(iter(needless), model)
+    size, std = _size(alone, effect)
     is_large = not effect.walks or _times_error(model, effect.sensor) > LEAST_TIMES
     parameters, statement = effect.of_strength(size, std)
     # Noise strengths are in every hypothesis, so no selection penalty applies. Each axis beyond the first is one more
@@ -114,7 +129,7 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
     cost = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
     price = price_of_choice(model, catalogue())
-    return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, price, is_large)
+    return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, alone, price, is_large)
 
 
 def _flicker(obs: Observations) -> FloatArray:
@@ -136,8 +151,11 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
     if not effect.walks:
         # One strength of the accelerometer, of a gyro one by axis.
         scatter = model.strengths[1][1:] if sensor else model.strengths[1][:1]
-        size = np.array(scatter) * obs.scatter_unit()[sensor] * si_per_raw
-        return size, size / np.sqrt(2.0 * max(obs.n_poses - 1, 1))
+        unit = obs.scatter_unit()[sensor] * si_per_raw
+        size = np.array(scatter) * unit
+        # A scatter far below the error of a pose is known to be below it, and no better.
+        of_square = (size**2 + unit**2) * np.sqrt(2.0 / max(obs.n_poses - 1, 1))
+        return size, np.sqrt(size**2 + of_square) - size
     sigma = (obs.pose_force_sigma, obs.pose_rate_sigma)[sensor]
     assert sigma is not None
     error = np.median(sigma, axis=0) * si_per_raw
