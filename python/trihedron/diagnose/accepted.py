@@ -233,7 +233,8 @@ def candidates(answer: Answer) -> tuple[Candidate, ...]:
 
 
 def tried_candidate(one: Tried, against: str | None, reason: str) -> Candidate:
-    term, asked = one.term, one.asked
+    # A prior that was narrowed for its evidence would bound the size by itself.
+    term, asked = one.term, one.asked.with_prior(one.term.sizes, one.term.sizes / min(one.term.scale, 1.0))
     size = term.effect.parameters(term.variant, asked.value, asked.covariance)
     # A parameter reported in another unit (an angle for a direction) has no upper limit here.
     linear = [p for p in size if p.name in term.variant.names and p.unit == size[0].unit]

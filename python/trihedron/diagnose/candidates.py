@@ -80,7 +80,7 @@ def candidates_beside(
         leading[k], asked[k] = sized[k], one
     plain = model.plain([one.strengths for one in asked])
     # The screening at fixed noise strengths may have chosen a prior width that is too small or too large.
-    terms = [replace(term, sizes=term.sizes * scale) for scale in (1.0, *RESCALED) for term in leading]
+    terms = [term.scaled(by) for by in (1.0, *RESCALED) for term in leading]
     under = [one.with_prior(t.sizes, t.sizes * s) for s in RESCALED for t, one in zip(leading, asked, strict=True)]
     return _best_of_each(terms, [*asked, *under], plain), missing
 
@@ -136,7 +136,7 @@ def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float) -> list
         may = [(term, look) for term, look in looks if 2.0 * float(look.gain.max()) - term.cost > -NEAR]
         kept = _ahead([*kept, *((term, _can_be(model, term, look), look.gain) for term, look in may)])
     scales = [PRIOR_SCALES[int(gain.max(axis=1).argmax())] for *_, gain in kept]
-    return [replace(term, sizes=term.sizes * scale) for (term, *_), scale in zip(kept, scales, strict=True)]
+    return [term.scaled(scale) for (term, *_), scale in zip(kept, scales, strict=True)]
 
 
 def _ahead(seen: list[tuple[Term, bool, FloatArray]]) -> list[tuple[Term, bool, FloatArray]]:

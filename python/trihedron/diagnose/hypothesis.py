@@ -33,12 +33,17 @@ OWN_DOMAINS = {"force": (STATIC_ACCEL, DYNAMICS), "rate": (STATIC_GYRO, MOVES, D
 @dataclass(frozen=True, eq=False)
 class Term:
     """One effect of a hypothesis: its columns, the prior σ of each parameter, and ``cost``, the correction for its
-    choice among shapes and effects, in twice a log-likelihood."""
+    choice among shapes and effects, in twice a log-likelihood. The prior is ``scale`` times that of data sheets."""
 
     effect: Effect
     variant: Variant
     sizes: FloatArray
     cost: float = 0.0
+    scale: float = 1.0
+
+    def scaled(self, by: float) -> Term:
+        """The effect with a prior so many times as wide."""
+        return replace(self, sizes=self.sizes * by, scale=self.scale * by)
 
     @property
     def distortion(self) -> Distortion:
@@ -137,11 +142,15 @@ class Hypothesis:
         return [AtStrengths(*one) for _, one in sorted(zip(order, found, strict=True), key=lambda pair: pair[0])]
 
     def at_its_strengths(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AddedTerms]:
-        """As :meth:`with_added` at the noise strengths found, prior sizes times the best of ``scales``."""
-        return [
-            AddedTerms(self.log_evidence + float(look.gain[:, 0].max()), self.strengths, look.value, look.covariance)
-            for look in (self.gains(terms, scales) if terms else [])
-        ]
+        """As :meth:`with_added` at the noise strengths found: evidence with prior sizes times the best of ``scales``,
+        parameters under the prior itself."""
+        out = []
+        for term, look in zip(terms, self.gains(terms, scales) if terms else [], strict=True):
+            best = int(look.gain[:, 0].argmax())
+            found = AddedTerms(self.log_evidence, self.strengths, look.value, look.covariance)
+            found = found.with_prior(term.scaled(scales[best]).sizes, term.sizes)
+            out.append(replace(found, log_evidence=self.log_evidence + float(look.gain[best, 0])))
+        return out
 
     def plain(self, strengths: Sequence[Strengths]) -> float:
         """Log-evidence without another term, noise strengths refitted from each of ``strengths``."""

@@ -7,7 +7,7 @@ slope and a precision. These add over recordings. Bias, S and noise strengths ar
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -151,7 +151,7 @@ def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]
         best = tried[0]
         names.add(best.effect.id)
         larger = tuple(
-            again(m, [*m.terms, replace(t, sizes=t.sizes * best.scale)])
+            again(m, [*m.terms, t.scaled(best.scale)])
             for m, t in zip(held.models, best.terms, strict=True)
         )
         held = _Held(larger, held.n_added + 1)
