@@ -150,10 +150,7 @@ def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]
             return held, tried
         best = tried[0]
         names.add(best.effect.id)
-        larger = tuple(
-            again(m, [*m.terms, t.scaled(best.scale)])
-            for m, t in zip(held.models, best.terms, strict=True)
-        )
+        larger = tuple(again(m, [*m.terms, t.scaled(best.scale)]) for m, t in zip(held.models, best.terms, strict=True))
         held = _Held(larger, held.n_added + 1)
 
 

@@ -10,7 +10,7 @@ from trihedron.records.domains import HeldOut, Where
 
 
 class PeriodicInterference(DirectEffect):
-    """One sinusoid, steady through all poses, in one or more channels."""
+    """Sinusoids, steady through all poses, each in one or more channels; the strongest first."""
 
     id = "periodic-interference"
     is_of_samples = True
@@ -23,18 +23,26 @@ class PeriodicInterference(DirectEffect):
             return None
         strongest = min(lines, key=lambda line: line.p_value)
         same = [line for line in lines if abs(line.frequency_hz - strongest.frequency_hz) < line.resolution_hz]
+        others = [line for line in lines if line not in same]
         parameters = [EffectParameter("frequency", strongest.frequency_hz, strongest.frequency_sigma_hz, "Hz")]
-        for line in same:
+        for line in (*same, *others):
+            if line in others:
+                name = f"frequency_{line.channel}"
+                parameters.append(EffectParameter(name, line.frequency_hz, line.frequency_sigma_hz, "Hz"))
             sensor, axis = divmod(line.index, 3)
             scale, unit = float(context.si_per_raw(sensor)[axis]), SENSORS[sensor].unit
             parameters.append(
                 EffectParameter(f"amplitude_{line.channel}", line.amplitude * scale, line.amplitude_sigma * scale, unit)
             )
-        where = Where(tuple(line.channel for line in same), (), (), (strongest.frequency_hz,))
+        frequencies = (strongest.frequency_hz, *(line.frequency_hz for line in others))
+        where = Where(tuple(line.channel for line in lines), (), (), frequencies)
         before, after, noise = strongest.rms_before, strongest.rms_after, strongest.noise
         held = HeldOut("within-static", (before / noise) ** 2, (after / noise) ** 2, before, after, "raw")
         return Evidence(
             strongest.p_value, float(-2 * np.log(strongest.p_value)), tuple(parameters),
-            self.reported("line", frequency_hz=strongest.frequency_hz, channels=[line.channel for line in same]),
+            self.reported(
+                "line", frequency_hz=strongest.frequency_hz, channels=[line.channel for line in same],
+                has_more=bool(others), others=[(line.frequency_hz, line.channel) for line in others],
+            ),
             "within-static", where, (held,), share=min(max(line.share for line in same), 1.0),
         )  # fmt: skip

@@ -181,7 +181,11 @@ SESSION = {
     "periodic-interference": EffectWords(
         "a spectral line in the static readings",
         "record a static log at another sampling rate: an aliased line moves, a true one stays",
-        {"line": "A spectral line at {frequency_hz:.3f} Hz is in {channels:&, } of static poses."},
+        {
+            "line": "A spectral line at {frequency_hz:.3f} Hz is in {channels:&, } of static poses"
+            "{has_more:?; others at {others:each; }|}.",
+        },
+        lines={"others": "{v0:.3f} Hz in {v1}"},
     ),
     "dropped-samples": EffectWords(
         "samples are missing while the timestamps are even",
