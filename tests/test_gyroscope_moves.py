@@ -163,14 +163,20 @@ def test_a_clipped_move_is_bridged_and_weighs_less(quiet):
         calibrated(replace(recording, gyroscope=hard), segments, truth)
 
 
-def test_a_zero_that_follows_gravity_is_found_and_taken_out(quiet):
+def test_a_bias_that_follows_gravity_is_found_and_leaves_the_answer_as_it_was(quiet):
     recording, truth, segments = quiet
     A = np.array([[0.0, 3e-4, 0.0], [4e-4, 0.0, 0.0], [0.0, 0.0, -2e-4]])
     tilted = replace(recording, gyroscope=recording.gyroscope + truth.specific_force_m_s2 @ A.T)
     means = segments.gyroscope_mean + segments.accelerometer_mean @ A.T
     found, findings = calibrated(tilted, replace(segments, gyroscope_mean=means), truth)
-    assert FindingCode.GYRO_G_SENSITIVITY in codes(findings)
+    (finding,) = [one for one in findings if one.code is FindingCode.GYRO_G_SENSITIVITY]
+    shown, per_g = finding.numbers, 9.80665 * np.abs(found.S @ A).max()
+    assert abs(shown["per_g_rad_s"] - per_g) < 4.0 * shown["sigma_per_g_rad_s"]
+    assert shown["sigma_per_g_rad_s"] < 0.05 * per_g
     assert np.abs(z_scores(found, truth)).max() < 4.0
+    # As a part of the session it costs the scale no certainty that a walk of the bias would.
+    alone, _ = calibrated(recording, segments, truth)
+    assert (found.sigma_S < 1.2 * alone.sigma_S).all()
     # Left in, it would miss by several times the noise of a move.
     assert found.quality.held_out_rms < 1.5 * found.quality.floor
 

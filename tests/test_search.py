@@ -9,9 +9,10 @@ import polars
 import pytest
 
 import trihedron
-from diagnosed_session import diagnosed, simulated, with_scatter
+from diagnosed_session import diagnosed, nearest_pose, simulated, with_scatter
 from nuisance_trial.draw import G, draw
-from trihedron.diagnose.accepted import Answer
+from trihedron.diagnose.accepted import Answer, tried_candidate
+from trihedron.diagnose.candidates import PRIOR_SCALES, Tried, terms_of
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
@@ -176,3 +177,29 @@ def test_a_dead_band_is_measured():
         found = [p.value for p in diagnosis.effects[0].parameters if p.name == f"dead_band_g{name}"]
         assert found
         assert abs(found[0] / scale[axis] - 60.0) < 2.0
+
+
+def test_what_a_log_says_of_an_effect_does_not_depend_on_the_priors_tried_for_its_evidence():
+    model = fitted()
+    (effect,) = [one for one in catalogue() if one.id == "accel-size-effect"]
+    (term,) = terms_of(model, effect, 0.0)
+    (plain,), (best,) = (model.at_its_strengths([term], scales) for scales in ((1.0,), PRIOR_SCALES))
+    assert best.log_evidence > plain.log_evidence
+    np.testing.assert_allclose(best.covariance, plain.covariance, rtol=1e-6)
+    # Hand moves do not show millimetres: the limit is that of the data sheet, not a tenth of it.
+    limit = tried_candidate(Tried(term, 0.0, best), None, "").limit95
+    assert limit > effect.size
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_drift_that_may_as_well_be_a_scatter_says_so(seed):
+    recording, truth = simulated(seed=seed, n_poses=14)
+    sigma = 0.012 / np.abs(np.diag(truth.accelerometer_S))
+    own = sigma * np.random.default_rng(seed).normal(size=(14, 3))
+    moved = recording.accelerometer + own[nearest_pose(truth.poses, recording.n_samples)]
+    found = trihedron.diagnose(replace(recording, accelerometer=moved), gravity_m_s2=truth.gravity_m_s2)
+    drifts = [one for one in found.effects if one.id == "accel-bias-drift"]
+    assert all("accel-bias-repeatability" in one.confounded_with for one in drifts)
+    (scatter,) = [one for one in found.candidates if one.id == "accel-bias-repeatability"]
+    assert drifts or "accel-bias-repeatability" in {one.id for one in found.effects}
+    assert scatter.limit95 is None or scatter.limit95 > 0.012

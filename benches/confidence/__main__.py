@@ -37,6 +37,7 @@ SETTINGS = {
     **{f"{hz:g} Hz": {"rate_hz": hz} for hz in (10.0, 1000.0)},
     **{f"{n} poses": {"n_poses": n} for n in (9, 40)},
     "1/f strong": STRONG,
+    **{f"g-sensitivity of {d:g} °/s/g": {"g_sensitivity": np.radians(d) / G} for d in (0.02, 0.1, 0.3)},
     **{f"lost {100 * p:g} %, timestamps true": {"lost": p} for p in (0.001, 0.03)},
     **{f"lost {100 * p:g} %, timestamps remade": {"lost": p, "is_remade": True} for p in (0.001, 0.03)},
     # Bias repeatability from pose to pose [°/s, mm/s²].

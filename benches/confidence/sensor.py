@@ -45,10 +45,12 @@ def read_out(
     accel_flicker=2e-4,
     gyro_range=500.0 * DEG,
     accel_range=2.2 * G,
+    g_sensitivity=0.0,
 ):
     """Counts (n, 3) of accelerometer and gyro, the rate [Hz] and the truth.
 
-    A density N in unit/√Hz gives readings of variance N² · rate; flicker is the coefficient B.
+    A density N in unit/√Hz gives readings of variance N² · rate; flicker is the coefficient B; elements of the
+    g-sensitivity are drawn with the standard deviation given.
     """
     rate_hz = 1.0 / (motion.step * per)
     at = np.arange(0, len(motion.w) - 1, per)
@@ -64,6 +66,8 @@ def read_out(
     own_f = np.eye(3) + rng.normal(size=(3, 3)) * 0.01
     zero_w = rng.normal(size=3) * 0.7 * DEG
     zero_f = rng.normal(size=3) * 0.3
+    if g_sensitivity:
+        w = w + f @ rng.normal(size=(3, 3)).T * g_sensitivity
     w = w @ own_w.T + zero_w
     f = f @ own_f.T + zero_f
     w += rng.normal(size=(n, 3)) * gyro_density * np.sqrt(rate_hz) + gyro_flicker * one_over_f(n, rate_hz, rng)

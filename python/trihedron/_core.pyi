@@ -561,6 +561,8 @@ class SessionModel:
         rate_effect: FloatArray | None,
         within: tuple[_Pair, _Pair, _Pair] | None = None,
         sizes: Sequence[float] | None = None,
+        is_near: bool = False,
+        is_rough: bool = False,
     ) -> SessionFit: ...
     def move_residuals(self, state: SessionState) -> FloatArray: ...
 

@@ -110,6 +110,15 @@ impl Session {
     }
 }
 
+/// How near the state at which a fit begins, and how far it goes.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Extent {
+    /// The start is the state of another fit: residuals of the moves show their weights.
+    pub is_near: bool,
+    /// It ends after the first descent, near enough for a search of noise strengths.
+    pub is_rough: bool,
+}
+
 /// Fits a session at given strengths: descents with fixed weights of the moves, renewed until the state converges.
 ///
 /// # Errors
@@ -119,19 +128,19 @@ pub fn fit(
     start: State,
     strengths: Strengths,
     distortion: &Distortion,
+    extent: Extent,
 ) -> Result<Fit> {
-    fit_from(session, start, None, strengths, distortion, false)
+    fit_from(session, start, None, strengths, distortion, extent)
 }
 
-/// [`fit`], with the moves as integrated at the start where these are known; with `ends_rough` it ends after the first
-/// descent, near enough for a search of noise strengths.
+/// [`fit`], with the moves as integrated at the start where these are known.
 pub(super) fn fit_from(
     session: &Session,
     start: State,
     known: Option<Vec<Passed>>,
     strengths: Strengths,
     distortion: &Distortion,
-    ends_rough: bool,
+    extent: Extent,
 ) -> Result<Fit> {
     let mut options = Options {
         step_tolerance: STEP_TOLERANCE,
@@ -144,7 +153,7 @@ pub(super) fn fit_from(
     let mut spread = 1.0_f64;
     let mut before: Option<Weights> = None;
     // Far from the optimum every residual is large.
-    let is_new = known.is_none();
+    let is_new = known.is_none() && !extent.is_near;
     let mut passed = match known {
         Some(known) if session.compares_in(&known, &state) => known,
         _ => session.pass(&state, distortion, &session.planes(&state)),
@@ -185,7 +194,7 @@ pub(super) fn fit_from(
         // Where residuals far exceed their noise a descent ends late, and renewed weights would start it again.
         let is_endless = !is_rough && ended.stop == Stop::TooManyIterations;
         spread = shown;
-        if is_settled || is_endless || ends_rough || renewal >= RENEWALS {
+        if is_settled || is_endless || extent.is_rough || renewal >= RENEWALS {
             let factor = match local.factor.into_inner() {
                 Some(factor) => factor,
                 None => local.chain.factor(RIDGE, None)?,

@@ -228,6 +228,8 @@ pub fn effect_columns(
         1 => add_effects::<1>,
         2 => add_effects::<2>,
         3 => add_effects::<3>,
+        // Of a session with a g-sensitivity.
+        11 => add_effects::<11>,
         _ => add_effects::<0>,
     };
     if k > 0 {

@@ -1,6 +1,6 @@
 //! A session at its most likely noise strengths (docs/model-session.md, 11.18).
 
-use super::fit::{Fit, fit_from};
+use super::fit::{Extent, Fit, fit_from};
 use super::hypothesis::Hypothesis;
 use super::strength_search::Within;
 use super::{Distortion, Session, State, Strengths};
@@ -13,7 +13,8 @@ const MOST_ROUNDS: usize = 4;
 const SETTLED: f64 = 0.25;
 const WORTH_A_FIT: f64 = 0.1;
 
-/// Fits a session and its noise strengths in turns; the search for strengths integrates out all unknowns.
+/// Fits a session and its noise strengths in turns, once if it is rough; the search for strengths integrates out all
+/// unknowns.
 ///
 /// # Errors
 /// As [`fit`].
@@ -23,8 +24,13 @@ pub fn tune(
     strengths: Strengths,
     distortion: &Distortion,
     within: &Within,
+    extent: Extent,
 ) -> Result<Fit> {
-    let mut found = fit_from(session, start, None, strengths, distortion, true)?;
+    let rough = Extent {
+        is_rough: true,
+        ..extent
+    };
+    let mut found = fit_from(session, start, None, strengths, distortion, rough)?;
     for round in 0..MOST_ROUNDS {
         let (best, gain) =
             Hypothesis::of(&found, &[], &[])?.likeliest(&[found.strengths], within)?;
@@ -33,8 +39,8 @@ pub fn tune(
             break;
         }
         let passed = Some(found.passed);
-        found = fit_from(session, found.state, passed, best, distortion, false)?;
-        if round > 0 && moved < SETTLED {
+        found = fit_from(session, found.state, passed, best, distortion, extent)?;
+        if extent.is_rough || (round > 0 && moved < SETTLED) {
             break;
         }
     }

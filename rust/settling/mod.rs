@@ -244,19 +244,27 @@ impl Sums {
 /// Restricted log-likelihood of variances `p` of scatter and `q` of settling; the bias, which acts as scatter does, has a
 /// flat prior.
 fn log_likelihood(sums: &[Sums], p: f64, q: f64) -> f64 {
-    let prior = Matrix6::from_diagonal(&Vector6::new(p, p, p, q, q, q));
+    let root = Vector6::new(p, p, p, q, q, q).map(f64::sqrt);
     let (mut normal, mut side, mut total) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
     for one in sums {
-        let wider = (Matrix6::identity() + one.information * prior).lu();
-        let Some(inverse) = wider.try_inverse() else {
+        // 1 + √P J √P = L Lᵀ for the prior P; the poses draw √P L⁻ᵀ L⁻¹ √P, given the readings.
+        let outer = root * root.transpose();
+        let wider = Matrix6::identity() + one.information.component_mul(&outer);
+        let Some(half) = wider.cholesky() else {
             return f64::NEG_INFINITY;
         };
-        // Covariance of what the poses draw, given the readings.
-        let drawn = prior * inverse;
-        let of_bias: Matrix6x3<f64> = one.information.fixed_columns::<3>(0).into();
-        normal += of_bias.fixed_rows::<3>(0) - of_bias.transpose() * drawn * of_bias;
-        side += one.said.fixed_rows::<3>(0) - of_bias.transpose() * drawn * one.said;
-        total += wider.determinant().ln() + one.square - one.said.dot(&(drawn * one.said));
+        let mut of_bias: Matrix6x3<f64> = one.information.fixed_columns::<3>(0).into();
+        let mut said = one.said.component_mul(&root);
+        normal += of_bias.fixed_rows::<3>(0);
+        for mut column in of_bias.column_iter_mut() {
+            column.component_mul_assign(&root);
+        }
+        let lower = half.l_dirty();
+        lower.solve_lower_triangular_unchecked_mut(&mut of_bias);
+        lower.solve_lower_triangular_unchecked_mut(&mut said);
+        normal -= of_bias.tr_mul(&of_bias);
+        side += one.said.fixed_rows::<3>(0) - of_bias.tr_mul(&said);
+        total += 2.0 * lower.diagonal().product().ln() + one.square - said.norm_squared();
     }
     let fitted = normal
         .try_inverse()

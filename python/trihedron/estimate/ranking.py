@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import FloatArray, rms_of
 from trihedron.estimate.gravity_error import norm_error
 from trihedron.estimate.gyroscope.measurements import measure_moves
-from trihedron.estimate.session.carried import carried_by
+from trihedron.estimate.session.carried import carried_by, without_g_sensitivity
 from trihedron.gravity import normal_gravity
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration, Verification
 from trihedron.records.ranking import Interval, Suspicion
@@ -89,7 +89,7 @@ def suspicions_of(
     gyro, own_gyro = calibration.gyroscope, own.gyroscope
     if gyro is None or own_gyro is None or segments.gyroscope_mean is None or not segments.moves:
         return tuple(out)
-    measured = measure_moves(recording, segments, own.accelerometer)
+    measured = without_g_sensitivity(measure_moves(recording, segments, own.accelerometer), own)
     # A wrong accelerometer causes tilt errors too: the log's own replaces it.
     base = calibration if found is None else own
     rates = segments.gyroscope_mean

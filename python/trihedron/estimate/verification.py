@@ -10,8 +10,8 @@ from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gravity_error import norm_error
-from trihedron.estimate.gyroscope.measurements import measure_moves
-from trihedron.estimate.session.carried import carried_by
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.session.carried import carried_by, without_g_sensitivity
 from trihedron.estimate.verified_parameters import (
     common_factor,
     imprecision_findings,
@@ -65,21 +65,22 @@ def verify_calibration(
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     empty = np.zeros(0)
     moves = Carriage(empty, empty, empty, np.zeros(0, dtype=np.int64), ())
-    gyroscope = calibration.gyroscope
+    gyroscope, measured = calibration.gyroscope, None
     force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
     rest, rest_noise = static_rate(gyroscope, segments)
     rest_sigma = expected_change(calibration, recording, segments, rest_noise)
     if gyroscope is not None and len(rest):
         rest = rest - earth_rate_up(recording.latitude_deg) / gravity_m_s2 * force
         if any(move.stop - move.start >= 2 for move in segments.moves):
-            moves = _carried(calibration, gyroscope, recording, segments)
+            measured = without_g_sensitivity(measure_moves(recording, segments, accelerometer), own)
+            moves = _carried(calibration, gyroscope, measured, segments)
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
     changed = _changed(parameters)
-    judged = (calibration, without, recording, segments)
+    judged = (calibration, without, measured, segments)
     worse = _worse_than_none(*judged, gravity_m_s2, (error, moves.angle_deg), changed)
     of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
-    of_rates = tuple(rate_findings(rest, rest_sigma, force, FAR_BEYOND))
+    of_rates = tuple(rate_findings(rest, rest_sigma, own, FAR_BEYOND))
     beyond_noise = (*of_poses, *_angle_findings(moves, changed, segments))
     return Verification(
         source=recording.source,
@@ -144,7 +145,7 @@ def _changed(parameters: tuple[JudgedParameter, ...]) -> _Changed:
 def _worse_than_none(
     calibration: Calibration,
     without: Calibration,
-    recording: Recording,
+    measured: MoveMeasurements | None,
     segments: Segments,
     gravity_m_s2: float,
     errors: tuple[FloatArray, FloatArray],
@@ -157,9 +158,9 @@ def _worse_than_none(
     bare, _, _ = norm_error(without.accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     pairs = {"static": (error, bare)}
     gyroscope = without.gyroscope
-    if gyroscope is not None and len(angle):
+    if gyroscope is not None and measured is not None:
         with_it = replace(calibration, gyroscope=gyroscope)
-        pairs["moves"] = (angle, _carried(with_it, gyroscope, recording, segments).angle_deg)
+        pairs["moves"] = (angle, _carried(with_it, gyroscope, measured, segments).angle_deg)
     return [
         Finding.of(
             FindingCode.WORSE_THAN_UNCALIBRATED,
@@ -199,8 +200,9 @@ def sense_findings(calibration: Calibration, recording: Recording, segments: Seg
     gyro = calibration.gyroscope
     if gyro is None or gyro.method != "turns" or not segments.moves:
         return
+    measured = measure_moves(recording, segments, calibration.accelerometer)
     stated, other = (
-        _carried(calibration, replace(gyro, S=sign * gyro.S), recording, segments).angle_deg for sign in (1.0, -1.0)
+        _carried(calibration, replace(gyro, S=sign * gyro.S), measured, segments).angle_deg for sign in (1.0, -1.0)
     )
     if _is_larger(stated, other):
         rms, rms_other = rms_of(stated), rms_of(other)
@@ -235,11 +237,10 @@ class Carriage:
 
 
 def _carried(
-    calibration: Calibration, gyroscope: SensorCalibration, recording: Recording, segments: Segments
+    calibration: Calibration, gyroscope: SensorCalibration, measured: MoveMeasurements, segments: Segments
 ) -> Carriage:
     """Tilt errors after rotations as in a calibration's report (docs/model-session.md): S of the calibration, a bias
     per pose, without moves that were at the gyro's range limit for long."""
-    measured = measure_moves(recording, segments, calibration.accelerometer)
     seen = carried_by(calibration, gyroscope.S, measured, segments)
     told = np.flatnonzero(~measured.is_lost)
     g = calibration.gravity_m_s2

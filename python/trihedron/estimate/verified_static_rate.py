@@ -7,11 +7,9 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import AXES, FloatArray, rms_of
-from trihedron.estimate.gyroscope.biases import attitude_dependence
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.session.drift import TYPICAL
 from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF, expected_scatter
-from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
 def static_rate(gyroscope: SensorCalibration | None, segments: Segments) -> tuple[FloatArray, FloatArray]:
@@ -85,16 +83,16 @@ def bias_findings(
         )
 
 
-def rate_findings(rest: FloatArray, sigma: FloatArray, force: FloatArray, far: float) -> Iterator[Finding]:
+def rate_findings(rest: FloatArray, sigma: FloatArray, own: Calibration | None, far: float) -> Iterator[Finding]:
     """Finding where rates (n, 3) change from pose to pose by more than is expected, serious above ``far`` times, and
-    whether with the specific force (n, 3), m/s²."""
+    whether the ``own`` calibration of the recording shows them to follow the specific force."""
     if len(rest) < 3 or not (sigma > 0.0).all():
         return
     away, dof = rest - rest.mean(axis=0), 3.0 * (len(rest) - 1)
     chi2_per_dof = float(np.sum((away / sigma) ** 2)) / dof
     if probability.fdtrc(dof, NOISE_DOF, chi2_per_dof) > probability.FALSE_ALARM:
         return
-    seen = attitude_dependence(rest, sigma**2, force)
+    seen = [] if own is None else [f for f in own.findings if f.code is FindingCode.GYRO_G_SENSITIVITY]
     pose, axis = np.unravel_index(int(np.argmax(np.abs(away))), away.shape)
     yield Finding.of(
         FindingCode.STATIC_RATE_ABOVE_NOISE,
@@ -105,6 +103,6 @@ def rate_findings(rest: FloatArray, sigma: FloatArray, force: FloatArray, far: f
         worst_pose=int(pose) + 1,
         axis=int(axis) + 1,
         worst_rad_s=float(away[pose, axis]),
-        is_by_gravity=seen is not None and seen.is_present,
-        per_g_rad_s=0.0 if seen is None else float(np.abs(seen.A).max()) * STANDARD_GRAVITY_M_S2,
+        is_by_gravity=bool(seen),
+        per_g_rad_s=seen[0].numbers["per_g_rad_s"] if seen else 0.0,
     )

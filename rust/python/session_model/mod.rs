@@ -16,7 +16,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::rows3;
-use crate::session_model::fit::fit;
+use crate::session_model::fit::{Extent, fit};
 use crate::session_model::move_rows::Weights;
 use crate::session_model::moves::MoveNoise;
 use crate::session_model::strength_search::Within;
@@ -207,12 +207,13 @@ impl SessionModel {
         })
     }
 
-    /// Fits from a state, at the `strengths` given, or at the most likely ones from there `within` some bounds.
+    /// Fits from a state, at the `strengths` given, or at the most likely ones from there `within` some bounds; `is_near`
+    /// where it is that of a fit, `is_rough` where a search of further unknowns follows.
     #[expect(
         clippy::too_many_arguments,
         reason = "named, and a thin seam: each is one array of the caller"
     )]
-    #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, within=None, sizes=None))]
+    #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, within=None, sizes=None, is_near=false, is_rough=false))]
     fn fit(
         &self,
         py: Python<'_>,
@@ -222,6 +223,8 @@ impl SessionModel {
         rate_effect: Option<Array3<'_>>,
         within: Option<Bounds>,
         sizes: Option<Vec<f64>>,
+        is_near: bool,
+        is_rough: bool,
     ) -> PyResult<SessionFit> {
         let start = self.checked(state)?;
         let mut effects = distortion(force_effect.as_ref(), rate_effect.as_ref(), &self.session)?;
@@ -237,10 +240,18 @@ impl SessionModel {
             effects.sizes = sizes;
         }
         let strengths = strengths_of(strengths);
+        let extent = Extent { is_near, is_rough };
         let session = Arc::clone(&self.session);
         let found = super::run_long(py, || match within {
-            Some(within) => tune(&session, start, strengths, &effects, &within_of(within)),
-            None => fit(&session, start, strengths, &effects),
+            Some(within) => tune(
+                &session,
+                start,
+                strengths,
+                &effects,
+                &within_of(within),
+                extent,
+            ),
+            None => fit(&session, start, strengths, &effects, extent),
         })?;
         Ok(SessionFit::new(Arc::clone(&self.session), found))
     }

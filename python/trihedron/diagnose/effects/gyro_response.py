@@ -6,6 +6,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import GYRO, Effect, Variant, acting_on, on_axes, per_axis
 from trihedron.records.words import why_not
+from trihedron.session.drift import PER_FORCE, by_force
 
 LEAST_RATE = 1e-3
 """rad/s: lower bound of the fastest rate, for recordings without rotation."""
@@ -15,8 +16,7 @@ class GyroGSensitivity(Effect):
     """Rate bias linear in specific force: the gyro reads ω + G f."""
 
     id = "gyro-g-sensitivity"
-    size = 2e-4
-    """(rad/s)/(m/s²): 0.1 °/s/g."""
+    size = PER_FORCE
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
@@ -24,7 +24,7 @@ class GyroGSensitivity(Effect):
 
     def variants(self, context: Context) -> list[Variant]:
         unit = "(rad/s)/(m/s^2)"
-        columns = np.einsum("kij,nj->nik", np.eye(9).reshape(9, 3, 3), context.force)
+        columns = by_force(context.force)
         names = tuple(f"G_{i}{j}" for i in AXES for j in AXES)
         whole = Variant(acting_on(1, columns), names, (unit,) * 9)
         # One gyro axis of three may have it, or show it.

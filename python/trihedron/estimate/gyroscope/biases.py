@@ -1,57 +1,9 @@
 """Gyro biases of the poses: their mean, their variance between poses, and the combined estimate for each pose."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
-from trihedron.estimate.known_vectors import KnownVectors, fit_known
-from trihedron.probability import MEDIAN_CHI2, fdtrc
-
-FALSE_ALARM = 1e-4
-"""Probability that g-sensitivity is removed from a sensor without it; the cost of removing a spurious one is small."""
-
-
-@dataclass(frozen=True, eq=False)
-class AttitudeDependence:
-    """``z(f) = z₀ + A f``: the raw bias (n, 3) of the poses against their specific force.
-
-    ``A`` (3, 3) in raw unit per m/s²; ``var_bias`` (3,) variances of ``z₀``; ``p_value`` of ``A = 0``;
-    ``scatter_left`` the ratio of the scatter of the pose biases with ``A`` to that without.
-    """
-
-    A: FloatArray
-    var_bias: FloatArray
-    p_value: float
-    scatter_left: float
-
-    @property
-    def is_present(self) -> bool:
-        """Whether the dependence is significant at ``FALSE_ALARM``."""
-        return self.p_value < FALSE_ALARM
-
-
-def attitude_dependence(zero: FloatArray, var_bias: FloatArray, force: FloatArray) -> AttitudeDependence | None:
-    """Regress the pose biases on specific force (n, 3), m/s²; ``None`` with fewer than 9 poses or poses in one plane.
-
-    One F test for the three axes: 9 slopes against 3 (n - 4) residual degrees of freedom.
-    """
-    n = len(zero)
-    design = np.column_stack([np.ones(n), force])
-    if n < 9 or np.linalg.matrix_rank(design, tol=1e-2 * float(np.linalg.norm(force, 2))) < 4:
-        return None
-    var_bias = np.maximum(var_bias, 1e-30 + 1e-24 * zero**2)
-    rows = KnownVectors(zero, force, np.ones(n), var_bias[:, :, None] * np.eye(3), np.zeros((n, 3, 0)))
-    fit = fit_known(rows)
-    mean = np.average(zero, axis=0, weights=1.0 / var_bias)
-    chi2_mean, chi2_line = float(np.sum((zero - mean) ** 2 / var_bias)), fit.chi2
-    per_dof = np.sum(rows.residual(fit.S_a, fit.b_a) ** 2 / var_bias, axis=0) / (n - 4)
-    var_z0 = np.diag(fit.covariance)[9:] * np.maximum(per_dof, 1.0)
-    ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), TINY)
-    # Where noise alone explains the pose biases, the ratio of two small sums is not tested.
-    p_value = float(fdtrc(9, 3 * (n - 4), ratio)) if chi2_mean > 3.0 * (n - 1) else 1.0
-    left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), TINY)))
-    return AttitudeDependence(fit.S_a, var_z0, p_value, left)
+from trihedron.probability import MEDIAN_CHI2
 
 
 def pool_biases(bias: FloatArray, var_bias: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

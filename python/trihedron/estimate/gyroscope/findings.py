@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trihedron.arrays import TINY, FloatArray, sigmas_of
+from trihedron.arrays import AXES, TINY, FloatArray, sigmas_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
@@ -56,9 +56,9 @@ def findings_of(
             chi2_per_dof=chi2_per_dof,
             dof=solution.moves_dof,
         )
-    yield from _attitude_findings(measured, S)
+    yield from _g_sensitivity_findings(measured, solution)
     # A random walk of b is part of the model; a curve says that b of this log is not b of the next.
-    is_curve = solution.has_gyro_drift and _is_material(np.ptp(measured.bias, axis=0), measured)
+    is_curve = "gyro-bias-drift" in solution.observed.causes and _is_material(np.ptp(measured.bias, axis=0), measured)
     yield from drift_findings("drifts" if is_curve else "poses", measured.bias, measured.bias_excess, S)
 
 
@@ -129,24 +129,23 @@ def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, see
         )
 
 
-def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> Iterator[Finding]:
-    attitude = measured.attitude
-    if attitude is None:
+def _g_sensitivity_findings(measured: MoveMeasurements, solution: SessionSolution) -> Iterator[Finding]:
+    if solution.g_sensitivity is None:
         return
-    per_g = np.abs(S @ attitude.A) * STANDARD_GRAVITY_M_S2
-    rate, force = (int(k) for k in np.unravel_index(int(np.argmax(per_g)), (3, 3)))
-    is_material = _is_material(np.abs(attitude.A).max(axis=1) * STANDARD_GRAVITY_M_S2, measured)
+    G, sigma = (of_g * STANDARD_GRAVITY_M_S2 for of_g in solution.g_sensitivity)
+    rate, force = (int(k) for k in np.unravel_index(int(np.argmax(np.abs(G))), (3, 3)))
+    is_material = _is_material(np.abs(np.linalg.solve(solution.S_w, G)).max(axis=1), measured)
     yield Finding.of(
         FindingCode.GYRO_G_SENSITIVITY,
         severity=Severity.WARNING if is_material else Severity.NOTE,
-        per_g_rad_s=per_g[rate, force],
+        per_g_rad_s=abs(G[rate, force]),
+        sigma_per_g_rad_s=sigma[rate, force],
         rate_axis=rate + 1,
         force_axis=force + 1,
-        scatter_left=attitude.scatter_left,
         # Its vertical part turns with gravity as a bias in proportion to it does.
-        may_be_earth=bool(per_g.max() <= EARTH_RATE_RAD_S),
+        may_be_earth=bool(np.abs(G).max() <= EARTH_RATE_RAD_S),
         earth_rad_s=EARTH_RATE_RAD_S,
-        largest_rad_s_per_m_s2=np.max(np.abs(S @ attitude.A)),
+        numbers={f"G_{AXES[k]}{AXES[m]}": float(G[k, m]) / STANDARD_GRAVITY_M_S2 for k, m in np.ndindex(3, 3)},
     )
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
-from trihedron.estimate.gyroscope.biases import AttitudeDependence, attitude_dependence, pool_biases, shrink
+from trihedron.estimate.gyroscope.biases import pool_biases, shrink
 from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rotation
 from trihedron.probability import chdtrc
 from trihedron.quantiles import MAD_TO_SIGMA, median
@@ -42,13 +42,13 @@ class MoveMeasurements:
     their variances; ``links`` (m, 2) the poses before and after each move. ``rows`` (samples,) are the recording's rows
     in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move's range in them;
     ``noise_density`` (3,) is the angle random walk in raw unit · √s, ``clipped_s`` (m,) the time of each move in which
-    the gyro is at its range limit. ``attitude`` is the dependence of the bias on specific force where it is subtracted,
-    from the gyro readings ``rate`` (samples, 3) and from the biases, whose mean over the session is ``bias_mean`` (3,).
-    ``is_undithered`` (3,) are the axes whose noise does not dither the LSB ``quantum`` (3,), ``is_hidden`` (samples, 3)
-    is 1 where the reading of such an axis is in the LSB of its bias. ``bias_read``, ``var_bias_read`` (n, 3) are the
-    biases from each pose alone, ``var_reading_noise`` (n, 3) the variance of the accelerometer's pose means by noise
-    alone, ``reading_variance`` (samples, 3) that of gyro readings which are bridged or rounded, ``shared_errors``
-    (samples, 3, k) are k errors of one σ each that all moves share.
+    the gyro is at its range limit. ``rate``, ``force`` (samples, 3) are the readings of gyro and accelerometer;
+    ``bias_mean`` (3,) is the mean of the biases over the session. ``is_undithered`` (3,) are the axes whose noise does
+    not dither the LSB ``quantum`` (3,), ``is_hidden`` (samples, 3) is 1 where the reading of such an axis is in the LSB
+    of its bias. ``bias_read``, ``var_bias_read`` (n, 3) are the biases from each pose alone, ``var_reading_noise``
+    (n, 3) the variance of the accelerometer's pose means by noise alone, ``reading_variance`` (samples, 3) that of gyro
+    readings which are bridged or rounded, ``shared_errors`` (samples, 3, k) are k errors of one σ each that all moves
+    share.
     """
 
     links: IntArray
@@ -67,8 +67,8 @@ class MoveMeasurements:
     clipped_s: FloatArray
     is_gapped: BoolArray
     bias_excess: FloatArray
-    attitude: AttitudeDependence | None
     rate: FloatArray
+    force: FloatArray
     is_undithered: BoolArray
     bias_read: FloatArray
     var_bias_read: FloatArray
@@ -87,6 +87,19 @@ class MoveMeasurements:
     def n_moves(self) -> int:
         """Number of moves."""
         return len(self.links)
+
+    def without_g_sensitivity(self, by_force: FloatArray, S: FloatArray, b: FloatArray) -> MoveMeasurements:
+        """The moves without what the gyro reads ``by_force`` (3, 3), raw unit per m/s², of an accelerometer S, b."""
+        of_poses = (self.reading @ S.T + b) @ by_force.T
+        read = self.bias_read - of_poses
+        mean, excess, _ = pool_biases(read, self.var_bias_read)
+        bias, var_bias = shrink(read, self.var_bias_read, mean)
+        bias = np.where(self.is_undithered, self.bias - of_poses, bias)
+        return replace(
+            self, rate=self.rate - (self.force @ S.T + b) @ by_force.T, bias_read=read, bias=bias,
+            var_bias=np.where(self.is_undithered, self.var_bias, var_bias), bias_excess=excess,
+            bias_mean=np.where(self.is_undithered, bias.mean(axis=0), mean),
+        )  # fmt: skip
 
 
 def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
@@ -118,9 +131,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
 def measure_moves(recording: Recording, segments: Segments, accelerometer: SensorCalibration) -> MoveMeasurements:
     """Collect pose means, moves and noise; clipped gyro readings are bridged.
 
-    A significant dependence of the bias on specific force is subtracted sample by sample: interpolation between two
-    poses would be wrong in the middle of a move. Raises ``InputError`` when a sensor is missing or there is no move
-    between two poses.
+    Raises ``InputError`` when a sensor is missing or there is no move between two poses.
     """
     gyroscope, raw_force = recording.gyroscope, recording.accelerometer
     if gyroscope is None or raw_force is None:
@@ -136,15 +147,9 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     quantum = recording.facts.of("gyroscope").step
     # The variance of pose means includes their rounding error (docs/segmentation.md).
     var_bias, var_reading = segments.gyroscope_sigma_mean**2, segments.accelerometer_sigma_mean**2
-    force = reading @ accelerometer.S.T + accelerometer.b
     scatter = np.full(3, np.inf) if segments.gyroscope_sigma is None else segments.gyroscope_sigma
     undithered = undithered_axes(quantum, scatter)
-    attitude = attitude_dependence(bias, var_bias, force)
-    if attitude is not None and attitude.is_present:
-        rate = gyroscope[rows] - (raw_force[rows] @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
-        bias = np.ascontiguousarray(bias - force @ attitude.A.T)
-    else:
-        attitude, rate = None, gyroscope[rows].copy()
+    rate = gyroscope[rows].copy()
     clipped = bridge_clipping(recording)
     extra, hidden, shared = _rounded(gyroscope, quantum, gyroscope_mean, undithered, (in_log, rows))
     if clipped is not None:
@@ -180,8 +185,8 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         clipped_s=clipped_time(clipped, in_log, nominal),
         is_gapped=np.array([np.max(steps[a : b - 1], initial=0.0) > GAP_STEPS * nominal for a, b in in_log]),
         bias_excess=excess,
-        attitude=attitude,
         rate=rate,
+        force=raw_force[rows],
         is_undithered=undithered,
         bias_read=bias_read,
         var_bias_read=var_bias_read,

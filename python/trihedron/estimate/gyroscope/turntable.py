@@ -16,7 +16,7 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.norm import gravity_quality
 from trihedron.estimate.gyroscope.measurements import measure_moves
-from trihedron.estimate.session.carried import carried_by, move_quality
+from trihedron.estimate.session.carried import carried_by, move_quality, without_g_sensitivity
 from trihedron.probability import FALSE_ALARM, fdtrc
 from trihedron.ranges import ranges_of
 from trihedron.records import Calibration, Finding, FindingCode, FitQuality, Recording, Segments, SensorCalibration
@@ -171,7 +171,7 @@ def with_own_residuals(calibration: Calibration, recording: Recording, segments:
         accelerometer = replace(accelerometer, quality=found)
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
         before = gyroscope.quality
-        measured = measure_moves(recording, segments, calibration.accelerometer)
+        measured = without_g_sensitivity(measure_moves(recording, segments, calibration.accelerometer), calibration)
         seen = carried_by(calibration, gyroscope.S, measured, segments)
         used = np.ones(len(seen.angle_deg)) if before.weights is None else before.weights
         after = move_quality(calibration.gravity_m_s2, seen, None, used, (before.chi2 + cost, before.dof))

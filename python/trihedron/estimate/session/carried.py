@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import AXES, FloatArray, IntArray
 from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.observed import Observed
-from trihedron.records import Calibration, FitQuality, Segments
-from trihedron.sensor_model import norms
+from trihedron.records import Calibration, FindingCode, FitQuality, Segments
+from trihedron.sensor_model import in_frame, norms
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
 from trihedron.session.noise import along_gradient
@@ -193,6 +193,18 @@ def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurem
     accelerometer = calibration.accelerometer
     read = replace(measured, rate=sharpened(measured.rate, measured.time_s, calibration.averaging))
     return carried(read, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, S_w)
+
+
+def without_g_sensitivity(measured: MoveMeasurements, own: Calibration | None) -> MoveMeasurements:
+    """The moves without the g-sensitivity that the ``own`` calibration of their recording shows, if any."""
+    shown = [] if own is None else [one for one in own.findings if one.code is FindingCode.GYRO_G_SENSITIVITY]
+    if own is None or own.gyroscope is None or not shown:
+        return measured
+    lower = in_frame(own, "lower")
+    assert lower.gyroscope is not None
+    G = np.reshape([shown[0].numbers[f"G_{i}{j}"] for i in AXES for j in AXES], (3, 3))
+    accelerometer = lower.accelerometer
+    return measured.without_g_sensitivity(np.linalg.solve(lower.gyroscope.S, G), accelerometer.S, accelerometer.b)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,9 +34,9 @@ class Observed(SessionReadings):
     ``force_effect``, ``rate_effect`` (poses, then samples of moves, 3, k), raw, are the derivatives of the readings by
     k unknowns with prior σ ``effect_sigma`` (k,): position of the bias inside its LSB, for the ``n_hidden`` axes whose
     noise does not dither it; averaging of readings over their interval, relative to ``EITHER``; errors that all moves
-    share; delay of the accelerometer; the ``n_drift`` last ones are curves of drifting biases. ``effect_time_s`` are
-    the times of their rows, ``pose_lasts_s`` (n,) the lengths of the poses. ``prior`` is that of both linear models on
-    centred readings.
+    share; delay of the accelerometer; those of ``causes``, by name. ``effect_time_s`` are the times of their rows,
+    ``effect_force`` (rows, 3) the readings of force there, ``pose_lasts_s`` (n,) the lengths of the poses. ``prior`` is
+    that of both linear models on centred readings.
     """
 
     gravity_m_s2: float
@@ -49,9 +49,10 @@ class Observed(SessionReadings):
     rate_effect: FloatArray
     effect_sigma: FloatArray
     effect_time_s: FloatArray
+    effect_force: FloatArray
     pose_lasts_s: FloatArray
     n_hidden: int
-    n_drift: int = 0
+    causes: dict[str, slice] = field(default_factory=dict)
     prior: Prior | None = None
 
     def behind_filters(self) -> Observed:
@@ -76,7 +77,7 @@ def arranged(
     n = recording.n_samples
     force_origin, rate_origin = measured.reading.mean(axis=0), measured.bias_read.mean(axis=0)
     rows = measured.rows
-    readings = recording.accelerometer[rows]
+    readings = measured.force
     ranges: list[tuple[int, int]] = []
     before = []
     for (start, stop), (pose, after), is_used in zip(measured.edges, measured.links, used, strict=True):
@@ -142,6 +143,7 @@ def arranged(
             *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
         ]),
         effect_time_s=np.concatenate([pose_time_s, measured.time_s[kept]]), pose_lasts_s=lasts_s,
+        effect_force=np.concatenate([measured.reading, readings[kept]]) - force_origin,
         n_hidden=len(coarse), earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
 

@@ -50,7 +50,7 @@ def calibrate_moves(
 class SolvedSession:
     """A session at its optimum, in the lower-triangular frame.
 
-    ``covariance`` (24, 24) of the parameters includes bias dependence on attitude and lost samples; ``gyroscope`` is
+    ``covariance`` (24, 24) of the parameters includes lost samples; ``gyroscope`` is
     the gyro's record, ``held_out`` the cross-validated residuals; ``findings`` are those of the moves.
     """
 
@@ -101,9 +101,6 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     solution, seen = found.solution, found.seen
     left_out = held_out(found.shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
-    if measured.attitude is not None:
-        more = solution.S_w @ np.diag(measured.attitude.var_bias) @ solution.S_w.T
-        covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
     losses = _losses(log, found)
     own_sigma = relative_sigma(covariance[12:, 12:], solution.S_w)
     covariance[12:, 12:] = losses.widened(covariance[12:, 12:], solution.S_w, solution.b_w, solution.inflation[0] ** 2)
@@ -124,7 +121,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
         quality=replace(quality, n_iterations=solution.iterations, stopped_because=solution.stopped_because),
         observability=describe(covariance[12:21, 12:21], solution.S_w),
     )
-    said = findings_of(found.outliers, measured, solution, gyroscope, seen, log.recording)
+    said = findings_of(found.outliers, found.shown, solution, gyroscope, seen, log.recording)
     return SolvedSession(
         solution, covariance, gyroscope, left_out, (*said, *losses.findings(own_sigma))
     )  # fmt: skip

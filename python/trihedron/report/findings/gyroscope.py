@@ -127,13 +127,12 @@ _MOVES = {
         numbers=("times",),
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
-        "the gyro's bias follows gravity, as by g-sensitivity, up to {per_g_rad_s:.2g °/s} per g ({rate_axis:axis} for "
-        "force along {force_axis:axis}); g-sensitivity leaves {scatter_left:.0f %} of the bias changes between poses. "
-        "The moves were fitted without it; S and b alone cannot correct it.",
+        "the gyro's bias follows gravity, as by g-sensitivity, up to {per_g_rad_s:.2g !°/s} ± {sigma_per_g_rad_s:.1g "
+        "°/s} per g ({rate_axis:axis} for force along {force_axis:axis}). S and b are those beside it and alone cannot "
+        "correct it.",
         "{may_be_earth:?the rotation of the Earth ({earth_rad_s:.2g °/s}), or |}g-sensitivity of the gyro.",
         "Separate g-sensitivity from a bias that differs from pose to pose: `trihedron diagnose LOG`; --extended fits "
         "g-sensitivity.",
-        numbers=("largest_rad_s_per_m_s2",),
         or_severity=WARNING,
     ),
     (Code.GYRO_BIAS_DRIFT, "poses", NOTE): Words(
