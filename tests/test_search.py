@@ -186,9 +186,9 @@ def test_what_a_log_says_of_an_effect_does_not_depend_on_the_priors_tried_for_it
     (plain,), (best,) = (model.at_its_strengths([term], scales) for scales in ((1.0,), PRIOR_SCALES))
     assert best.log_evidence > plain.log_evidence
     np.testing.assert_allclose(best.covariance, plain.covariance, rtol=1e-6)
-    # Hand moves do not show millimetres: the limit is that of the data sheet, not a tenth of it.
+    # Hand moves hardly show millimetres: under a prior of a tenth of the data sheet the limit would be a fifth of it.
     limit = tried_candidate(Tried(term, 0.0, best), None, "").limit95
-    assert limit > effect.size
+    assert limit > 0.5 * effect.size
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
