@@ -1,14 +1,17 @@
 //! The evidence of a hypothesis: the rows of a session at one state, with the columns of further effects, at any noise
 //! strengths (docs/model-session.md, 11.18).
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::Strengths;
 use super::chain::{Chain, Layout};
 use super::elimination::eliminated;
 use super::fit::{Fit, RIDGE, chi2_of, gradient};
-use super::move_rows::{MoveResidual, Passed, Whitening, with_tails};
+use super::move_rows::{MoveResidual, Whitening};
 use super::moves::N_MOVE;
+use super::open_move::Open;
 use super::rows::{Group, N_PROCESSES, size_row};
 use super::strength_search::{Search, Within};
 use crate::error::{Error, Result};
@@ -25,6 +28,12 @@ pub(super) struct Part {
     pub n: usize,
 }
 
+/// All rows but those of the bias processes, and the logarithm of their normalisation.
+pub(super) struct Weighed {
+    pub part: Part,
+    pub log_weight: f64,
+}
+
 /// A session at one state, its rows by process; those of moves are not whitened yet.
 pub struct Hypothesis {
     layout: Layout,
@@ -34,54 +43,6 @@ pub struct Hypothesis {
     pub(super) process: Vec<Part>,
     pub(super) moves: Vec<Open>,
     n_added: usize,
-}
-
-/// A move in SI: derivatives with respect to the border, the pose before and the pose after, and the residual, column
-/// after column; and the terms of its covariance.
-pub(super) struct Open {
-    pose: usize,
-    columns: DMatrix<f64>,
-    passed: Passed,
-    /// The residual about which the tails of its noise are: that of the fit, or of one linear step from it.
-    left: MoveResidual,
-}
-
-impl Open {
-    fn of(group: &Group, back: &Whitening, passed: &Passed) -> Self {
-        let rows = &group.rows;
-        let parts = [&rows.border, &rows.here, &rows.next].map(DMatrix::as_slice);
-        let flat: Vec<f64> = parts
-            .into_iter()
-            .flatten()
-            .chain(rows.residual.as_slice())
-            .copied()
-            .collect();
-        let white = DMatrix::from_vec(N_MOVE, flat.len() / N_MOVE, flat);
-        Self {
-            pose: rows.pose.unwrap_or(group.segment),
-            columns: DMatrix::from_column_slice(N_MOVE, white.ncols(), (back * &white).as_slice()),
-            passed: passed.clone(),
-            left: passed.carried.residual,
-        }
-    }
-
-    /// `L⁻¹` of its covariance `L Lᵀ` at some strengths, its weight by heavy tails, and the logarithm of that weight's
-    /// prior.
-    fn whitening(&self, strengths: &Strengths) -> Option<(Whitening, f64, f64)> {
-        with_tails(&self.passed.covariance(strengths), &self.left)
-    }
-
-    /// The residual one linear `step` of all unknowns further.
-    fn moved(&self, layout: Layout, step: &DVector<f64>) -> MoveResidual {
-        let (b, p, at) = (layout.border, layout.pose, layout.at(self.pose));
-        let n = b + 2 * p;
-        let unknown = |c: usize| if c < b { step[c] } else { step[at + c - b] };
-        let columns = (0..n).map(|c| self.columns.fixed_view::<N_MOVE, 1>(0, c) * unknown(c));
-        columns.fold(
-            self.columns.fixed_view::<N_MOVE, 1>(0, n).into_owned(),
-            |sum, column| sum + column,
-        )
-    }
 }
 
 /// Evidence and estimate of a hypothesis.
@@ -160,28 +121,38 @@ impl Hypothesis {
         })
     }
 
-    /// All rows but those of the bias processes, at some strengths, and the logarithm of their normalisation.
-    pub(super) fn weighted_rows(&self, strengths: &Strengths) -> Option<(Part, f64)> {
-        let mut weight = self.fixed_weight;
+    /// All rows but those of the bias processes at some strengths.
+    pub(super) fn weighted_rows(&self, strengths: &Strengths) -> Option<Weighed> {
+        self.with_moves(self.moves.iter().map(|open| {
+            let (white, _, prior) = open.whitening(strengths)?;
+            let log_weight = white.diagonal().map(f64::ln).sum() + prior;
+            Some((Cow::Borrowed(&open.columns), white, log_weight))
+        }))
+    }
+
+    /// The same with other rows of the moves: columns, whitening and the logarithm of the normalisation of each.
+    pub(super) fn with_moves<'a>(
+        &self,
+        moves: impl Iterator<Item = Option<(Cow<'a, DMatrix<f64>>, Whitening, f64)>>,
+    ) -> Option<Weighed> {
+        let mut log_weight = self.fixed_weight;
         let mut chain = self.fixed.chain.clone();
         let mut side = self.fixed.side.clone();
         let mut sum = self.fixed.sum;
-        for open in &self.moves {
-            let (white, _, prior) = open.whitening(strengths)?;
-            weight += white.diagonal().map(f64::ln).sum() + prior;
-            sum += chain.add_move(open.pose, &open.columns, &white, &mut side);
+        for (open, one) in self.moves.iter().zip(moves) {
+            let (columns, white, own) = one?;
+            log_weight += own;
+            sum += chain.add_move(open.pose, &columns, &white, &mut side);
         }
         chain.mirror();
         let n = N_MOVE * self.moves.len() + self.fixed.n;
-        Some((
-            Part {
-                chain,
-                side,
-                sum,
-                n,
-            },
-            weight,
-        ))
+        let part = Part {
+            chain,
+            side,
+            sum,
+            n,
+        };
+        Some(Weighed { part, log_weight })
     }
 
     /// `L⁻¹` of every move's covariance at some strengths, by index of the move.
@@ -211,8 +182,8 @@ impl Hypothesis {
     }
 
     /// Log-evidence at some strengths; `weighted_rows` are the rows outside the processes at them.
-    pub(super) fn beside(&self, strengths: &Strengths, weighted_rows: &(Part, f64)) -> f64 {
-        let (part, mut weight) = (&weighted_rows.0, weighted_rows.1);
+    pub(super) fn beside(&self, strengths: &Strengths, weighted_rows: &Weighed) -> f64 {
+        let (part, mut weight) = (&weighted_rows.part, weighted_rows.log_weight);
         let mut side = part.side.clone();
         let mut sum = part.sum;
         let mut weighed = Vec::with_capacity(N_PROCESSES);
@@ -265,15 +236,24 @@ impl Hypothesis {
     /// # Errors
     /// When a move has no noise.
     pub(super) fn system(&self, strengths: &Strengths) -> Result<(Chain, DMatrix<f64>)> {
-        let (part, _) = self
+        let rows = self
             .weighted_rows(strengths)
             .ok_or_else(|| Error::not_determined("a move has no noise"))?;
+        Ok(self.with_processes(rows.part, strengths))
+    }
+
+    /// Normal equations and `Jᵀr` of some rows with those of the processes at some strengths.
+    pub(super) fn with_processes(
+        &self,
+        part: Part,
+        strengths: &Strengths,
+    ) -> (Chain, DMatrix<f64>) {
         let (mut chain, mut side) = (part.chain, part.side);
         for (process, factor) in self.process.iter().zip(self.factors(strengths)) {
             chain.add_scaled(&process.chain, factor * factor);
             side += &process.side * (factor * factor);
         }
-        Ok((chain, side))
+        (chain, side)
     }
 
     /// The most likely strengths, searched from the best of `starts`, with the evidence and the estimate there; the

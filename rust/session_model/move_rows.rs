@@ -22,7 +22,7 @@ pub type MoveResidual = SVector<f64, N_MOVE>;
 
 /// Degrees of freedom of the tails of moves: a residual of a hundred times the noise, as a jolt or lost samples leave,
 /// costs 70 in twice a log-likelihood and not ten thousand; one of the size of the noise has its full weight.
-const DEGREES: f64 = 4.0;
+pub(super) const DEGREES: f64 = 4.0;
 
 /// Whitening of a move under Student t noise of this `covariance` about its `residual`, the weight of that residual and
 /// the logarithm of the weight's prior, which is 0 at 1 (11.18a): the tightest Gaussian bound of the t density.

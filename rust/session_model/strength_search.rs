@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::hypothesis::{Hypothesis, Part};
+use super::hypothesis::{Hypothesis, Weighed};
 use super::{N_SCATTER, Strengths};
 
 /// Scatter that counts as none, in units of the session's reference.
@@ -42,7 +42,7 @@ const BETWEEN: (f64, f64) = (-3.0, 0.2);
 const EXCESS: (f64, f64) = (-4.6, 9.2);
 /// Standard deviation of the logarithm of an excess: the motion faster than the samples is extrapolated, to a factor of
 /// three.
-const EXTRAPOLATED: f64 = 1.1;
+pub(super) const EXTRAPOLATED: f64 = 1.1;
 /// Rows with this excess have no weight, and keep none: a search leaves it as given.
 const NO_WEIGHT: f64 = 6.9;
 /// Scatter at which a search from nothing begins: near nothing the evidence is flat.
@@ -104,7 +104,7 @@ pub(super) struct Search<'a> {
     x: Point,
     value: f64,
     /// The rows outside the bias processes at the strengths evaluated last, and those strengths.
-    weighted_rows: Option<([u64; N_STRENGTHS - SCATTER_AT], (Part, f64))>,
+    weighted_rows: Option<([u64; N_STRENGTHS - SCATTER_AT], Weighed)>,
 }
 
 impl<'a> Search<'a> {

@@ -19,7 +19,7 @@ from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
 from trihedron.estimate.gravity_circle import opposite_headings
 from trihedron.estimate.gyroscope.common_scale import scale_findings, without_first_scale
-from trihedron.estimate.gyroscope.lost_samples import missing_samples
+from trihedron.estimate.gyroscope.lost_samples import missing_samples, relative_sigma
 from trihedron.estimate.gyroscope.measurements import GAP_STEPS
 from trihedron.estimate.gyroscope.stated_turns import on_stated_turns
 from trihedron.estimate.gyroscope.turn_angles import (
@@ -35,7 +35,6 @@ from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, 
 from trihedron.estimate.session.start import GyroClippedError
 from trihedron.estimate.verification import reference_findings, sense_findings
 from trihedron.estimate.verified_static_rate import with_static_rate
-from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
 from trihedron.records.progress import Progress
@@ -197,7 +196,9 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     fitted = tuple(_timed(one, recording, segments) for one in with_shapes(calibration, segments))
     if gyro is None:
         return fitted
-    sigma_scale = median(np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0))
+    # The uncertainty without losses, where it is widened by those that are possible.
+    possible = [one.numbers["sigma_scale"] for one in fitted if one.code is FindingCode.LOSSES_POSSIBLE]
+    sigma_scale = min([relative_sigma(gyro.covariance, gyro.S), *possible])
     missing = tuple(missing_samples(recording, segments, sigma_scale))
     of_gyro = (*scale_findings(gyro.S, recording), *sense_findings(calibration, recording, segments))
     # Losses detected in the motion are not also possible ones of the fit.

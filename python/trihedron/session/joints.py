@@ -6,7 +6,6 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.probability import chdtri
 from trihedron.session.averaging import GAP
 
 STRONG = 20.0
@@ -33,15 +32,11 @@ class Joints:
     @property
     def share(self) -> float:
         """Share of samples that are missing."""
-        return self._certain / max(self.telling, 1)
+        return self.n_lost / max(self.telling, 1)
 
     @property
-    def largest_share(self) -> float:
-        """Upper limit of that share, once exceeded in a thousand: losses at random are Poisson."""
-        return 0.5 * chdtri(2.0 * self._certain + 2.0, 1e-3) / max(self.telling, 1)
-
-    @property
-    def _certain(self) -> float:
+    def n_lost(self) -> float:
+        """Number of samples that are certainly missing."""
         return float(self.count[self.is_certain].sum())
 
 

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::evidence::{Answer, Candidate, Glance, seen, tuned};
-use super::read_out::{Blocks, Rows, flagged, labels, moves, path, stacked};
+use super::read_out::{Blocks, Rows, Shares, flagged, labels, moves, path, shares_of, stacked};
 use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
 use crate::python::arrays::{matrix, of3, vector3, vectors};
@@ -244,6 +244,20 @@ impl SessionFit {
             strengths,
             parts,
         )
+    }
+
+    /// Log-evidence `(k,)` of every share of lost samples, change of the gyro's `S` `(k, 9)` and its covariance
+    /// `(k, 9, 9)`; `None` where none is likelier than every share.
+    fn lost_samples<'py>(
+        &self,
+        py: Python<'py>,
+        shares: Vec<f64>,
+    ) -> PyResult<Option<Shares<'py>>> {
+        let fit = Arc::clone(&self.fit);
+        let Some(found) = run_long(py, || fit.lost_samples(&shares))? else {
+            return Ok(None);
+        };
+        Ok(Some(shares_of(py, &found)?))
     }
 
     /// `(rows,)` leverage of every row.

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, Vector3};
 use numpy::{
-    PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
+    ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -10,11 +11,14 @@ use pyo3::prelude::*;
 use crate::python::arrays::vectors;
 use crate::session_model::Session;
 use crate::session_model::fit::Fit;
+use crate::session_model::lost_samples::{N_RATE, Share};
 use crate::session_model::predict::domain_of;
 use crate::session_model::rows::Domain;
 
 pub(super) type Rows<'py> = Bound<'py, PyArray2<f64>>;
 pub(super) type Blocks<'py> = Bound<'py, PyArray3<f64>>;
+/// Log-evidence, change of the gyro's `S` and its covariance, share after share.
+pub(super) type Shares<'py> = (Bound<'py, PyArray1<f64>>, Rows<'py>, Blocks<'py>);
 
 /// `(rows, 4)` domain, segment, channel and process of every row.
 pub(super) fn labels<'py>(py: Python<'py>, fit: &Fit) -> PyResult<Bound<'py, PyArray2<i64>>> {
@@ -110,4 +114,21 @@ pub(super) fn stacked<'py>(
         .collect();
     let n: usize = parts.iter().map(DMatrix::nrows).sum();
     flat.to_pyarray(py).reshape([n, k])
+}
+
+/// Every share of lost samples.
+pub(super) fn shares_of<'py>(py: Python<'py>, found: &[Share]) -> PyResult<Shares<'py>> {
+    let k = found.len();
+    let evidence: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
+    let steps = found.iter().flat_map(|one| one.step.as_slice().to_vec());
+    let step: Vec<f64> = steps.collect();
+    let blocks = found
+        .iter()
+        .flat_map(|one| one.covariance.as_slice().to_vec());
+    let covariance: Vec<f64> = blocks.collect();
+    Ok((
+        evidence.to_pyarray(py),
+        step.to_pyarray(py).reshape([k, N_RATE])?,
+        covariance.to_pyarray(py).reshape([k, N_RATE, N_RATE])?,
+    ))
 }

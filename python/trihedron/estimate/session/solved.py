@@ -13,18 +13,18 @@ from trihedron.estimate.accelerometer.verdict import residual_findings
 from trihedron.estimate.gyroscope.findings import describe, findings_of, worst_sigma
 from trihedron.estimate.gyroscope.lost_samples import (
     PossibleLosses,
-    is_asked_for_losses,
-    losses_that_fit,
+    could_be_remade,
+    possible_losses,
     relative_sigma,
-    seen_in_motion,
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Near, with_prior
 from trihedron.estimate.session.start import Log, begun, is_enough, lower, near_one_another, scale_matrix
-from trihedron.probability import FALSE_ALARM, chdtri
+from trihedron.probability import FALSE_ALARM, chdtri, fdtrc
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.session.noise import NOISE_DOF
 
 
 def calibrate_moves(
@@ -103,7 +103,7 @@ def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedS
     covariance = solution.covariance.copy()
     losses = _losses(log, found)
     own_sigma = relative_sigma(covariance[12:, 12:], solution.S_w)
-    covariance[12:, 12:] = losses.widened(covariance[12:, 12:], solution.S_w, solution.b_w, solution.inflation[0] ** 2)
+    covariance[12:, 12:] = losses.widened(covariance[12:, 12:], solution.S_w, solution.b_w)
     quality = move_quality(
         log.gravity_m_s2,
         seen,
@@ -195,16 +195,29 @@ def _standard_errors(covariance: FloatArray) -> FloatArray:
 
 def _losses(log: Log, found: _Fit) -> PossibleLosses:
     """Undetected lost samples that may explain the tilt errors."""
-    time_s, sampling = log.recording.time_s, log.recording.sampling
-    if sampling.is_even and sampling.has_own_clock:
+    sampling, solution, measured = log.recording.sampling, found.solution, found.measured
+    shows_losses = sampling.is_even and sampling.has_own_clock
+    if shows_losses or not could_be_remade(log.recording.time_s, measured.nominal_step_s):
         return PossibleLosses()
-    if not is_asked_for_losses(time_s, found.measured, found.outliers, found.solution, found.seen):
-        return PossibleLosses()
-    missed, dof = (found.seen.angle_deg, found.seen.floor2), found.solution.moves_dof
-    by_tilt = losses_that_fit(time_s, found.measured, found.solution.S_w, log.gravity_m_s2, missed, dof, found.used)
-    # As many as these errors need would be seen in the motion.
-    is_denied = by_tilt.possible > seen_in_motion(log.recording, log.segments)[0].largest_share
-    return PossibleLosses() if is_denied else by_tilt
+    if found.outliers:
+        # A move that lost samples is an outlier among those that lost none.
+        near = solution.S_a, solution.b_a, solution.S_w
+        observed = log.observed(measured, ~measured.is_lost, near)
+        is_steady = not solution.observed.causes
+        solution = refitted(observed, solution) if is_steady else solve_session(observed, *near)
+    losses = possible_losses(log.recording, log.segments, solution.core)
+    fitted = found.solution
+    if fitted.moves_dof < 1.0 or fdtrc(fitted.moves_dof, NOISE_DOF, fitted.moves_chi2 / fitted.moves_dof) > FALSE_ALARM:
+        return losses
+    return replace(losses, scatter=_mean_square(log, found) / fitted.inflation[0] ** 2)
+
+
+def _mean_square(log: Log, found: _Fit) -> float:
+    """Mean square of the tilt errors over that by noise: beyond the square of the usual one where few are large."""
+    seen, used = found.seen, found.used
+    errors = np.radians(seen.angle_deg[used]) * log.gravity_m_s2
+    by_noise = float(seen.floor2[used].sum()) * max(found.solution.moves_dof, 1.0) / (2.0 * np.count_nonzero(used))
+    return float((errors**2).sum()) / max(by_noise, TINY)
 
 
 # The gyro's scale from gravity: rough, but sufficient to distinguish turns of 90, 180 and 360 degrees.

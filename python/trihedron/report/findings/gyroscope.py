@@ -187,9 +187,9 @@ _MOVES = {
         "State the directions of the board's axes with --axis-signs, or turn the signs of --turns.",
     ),
     (Code.LOSSES_POSSIBLE, "", SERIOUS): Words(
-        "The tilt error after rotations exceeds noise, and S and b do not say why. If samples are lost without a trace "
-        "in these timestamps, up to {lost_share:.2g %} of them could be missing; every turn, and the gyro's scale "
-        "factors, would be wrong by as much; their standard error without that is {sigma_scale:.2g %}.",
+        "Tilt errors after rotations are as if samples were lost without a trace in these timestamps: up to "
+        "{lost_share:.2g %} of them could be missing, and the gyro's scale factors be wrong by up to as much; their "
+        "standard error without that is {sigma_scale:.2g %}.",
         "An effect that S and b lack (a nonlinear gyro); a support that gives way after the moves; a link or a logger "
         "that drops samples and renumbers the others, or timestamps them anew.",
         "See which: `trihedron diagnose LOG`. Where it names no effect, put the sensor on a firm support, log the "
