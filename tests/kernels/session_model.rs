@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use trihedron::session_model::chain::Layout;
-use trihedron::session_model::fit::{Fit, fit};
+use trihedron::session_model::fit::{Extent, Fit, fit};
 use trihedron::session_model::move_rows::Weights;
 use trihedron::session_model::rows::Group;
 use trihedron::session_model::strength_search::Within;
@@ -130,9 +130,9 @@ fn rows_that_miss_by_a_thousand_errors_end_in_one_place_whatever_the_start() {
     let none = Distortion::default();
     let exact = residuals(&session, &truth, &truth, &none);
     assert!(exact.amax() > 1e3, "{}", exact.amax());
-    let near = fit(&session, truth.clone(), STRENGTHS, &none).expect("fit");
+    let near = fit(&session, truth.clone(), STRENGTHS, &none, Extent::default()).expect("fit");
     let start = beside(&truth, session.layout(0), 0);
-    let far = fit(&session, start, STRENGTHS, &none).expect("fit");
+    let far = fit(&session, start, STRENGTHS, &none, Extent::default()).expect("fit");
     assert!(near.stop.is_converged() && far.stop.is_converged());
     // A rough descent of a dozen, and a few that polish: renewed weights must not begin it again each time.
     assert!(far.iterations < 60, "{}", far.iterations);
@@ -148,14 +148,23 @@ fn rows_that_miss_by_a_thousand_errors_end_in_one_place_whatever_the_start() {
 fn strengths_are_sought_within_bounds_and_only_raise_the_likelihood() {
     let (session, truth) = made(true);
     let none = Distortion::default();
-    let given = fit(&session, truth.clone(), STRENGTHS, &none).expect("fit");
+    let given = fit(&session, truth.clone(), STRENGTHS, &none, Extent::default()).expect("fit");
     let within = Within {
         corner_s: [50.0, 50.0],
         scatter: [2.0, 0.5],
         excess: [1.0, 1.0],
     };
-    let tuned =
-        |within: &Within| tune(&session, truth.clone(), STRENGTHS, &none, within).expect("fit");
+    let tuned = |within: &Within| {
+        tune(
+            &session,
+            truth.clone(),
+            STRENGTHS,
+            &none,
+            within,
+            Extent::default(),
+        )
+        .expect("fit")
+    };
     let (free, bound) = (tuned(&Within::ANYTHING), tuned(&within));
     // A search ends where a pass gains less than a tenth.
     assert!(free.log_marginal() > given.log_marginal() - 0.1);
