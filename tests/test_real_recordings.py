@@ -319,7 +319,6 @@ def test_white_noise_behind_a_low_pass_lies_inside_its_interval(low_pass):
     for axis, white in zip(result.axes, found, strict=True):
         assert FindingCode.SPECTRUM_LOW_PASS in codes(axis)
         assert axis.highest_hz < RATE / 10.0
-        # It was 1 to 3 % low, by four to eight of its standard errors.
         assert white.lower < WHITE < white.upper
         assert white.estimate == pytest.approx(WHITE, rel=0.02)
 
@@ -327,7 +326,7 @@ def test_white_noise_behind_a_low_pass_lies_inside_its_interval(low_pass):
 def test_readings_far_out_that_belong_to_the_noise_are_not_cut_from_it():
     x = 1e-3 * np.random.default_rng(0).standard_t(3, size=(N, 3)) / np.sqrt(3.0)
     result, found = axes_of(x)
-    # 384 of them were disturbances, and N was 6 % low with an uncertainty of 0.1 %. A few of the largest still are.
+    # A few of the largest are.
     assert len(result.excluded_s) < 30
     for white in found:
         assert abs(white.estimate - WHITE) < 3.0 * white.sigma
