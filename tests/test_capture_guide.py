@@ -226,7 +226,7 @@ def test_a_real_browser_shows_the_guide(led):
             screen.on("pageerror", lambda error: faults.append(str(error)))
             screen.goto(page.address)
             # The view comes by the stream of events, after the page.
-            screen.wait_for_function(f"document.getElementById('big').textContent.startsWith('{view.n_poses}')")
+            screen.locator("#big", has_text=re.compile(f"^{view.n_poses}")).wait_for()
             assert faults == []
             table, foot = (screen.query_selector(part).bounding_box() for part in ("table", "footer"))
             assert foot["y"] >= table["y"] + table["height"] - 1.0, "on a phone nothing covers the table"
