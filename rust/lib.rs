@@ -27,6 +27,7 @@ pub mod mean_noise;
 pub mod move_moments;
 pub mod move_signals;
 pub mod noise_floor;
+pub mod nonlinearity;
 pub mod norm_invariant;
 pub mod number_text;
 pub mod order_statistics;

@@ -2,6 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+/// Row and column of each element of a lower-triangular `S`.
+pub const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
 /// Direct model `f = S a' + b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {

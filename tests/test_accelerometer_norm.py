@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from trihedron import calibrate
+from trihedron import _core, calibrate
 from trihedron.estimate.accelerometer import bending
-from trihedron.estimate.accelerometer.bending import SHAPES, covariance_by_bends
+from trihedron.estimate.accelerometer.bending import SHAPES
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gravity_error import norm_error
@@ -24,6 +24,8 @@ SIGMA = np.array([0.35, 0.30, 0.42])  # counts: about 0.8 mm/s²
 GRAVITY = 9.81
 SCATTER, BENDS = 8e-3, 2e-2
 """m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""
+EVERYWHERE = np.random.default_rng(0).normal(size=(4000, 3))
+EVERYWHERE /= np.linalg.norm(EVERYWHERE, axis=1, keepdims=True)
 
 
 def cube_poses() -> np.ndarray:
@@ -217,12 +219,17 @@ def test_bars_hold_for_scatter_and_for_bending(name, n):
         up, sigma = drawn(rng, n)
         bent = np.zeros((n, 3)) if name is None else SHAPES[name](up)
         scattered = sigma * rng.normal(size=n) + (SCATTER * rng.normal(size=n) if name is None else 0.0)
-        residual, found = linear_fit(up, scattered + BENDS * (bent @ rng.normal(size=3)), sigma)
+        size = rng.normal(size=3)
+        residual, found = linear_fit(up, scattered + BENDS * (bent @ size), sigma)
+        if name is not None:
+            # S and b are the best linear approximation over all directions, by the lengths of gravity.
+            found = found - np.linalg.lstsq(design_of(EVERYWHERE), BENDS * SHAPES[name](EVERYWHERE) @ size)[0]
         white = design_of(up) / sigma[:, None]
-        alone = np.sum((residual / sigma) ** 2) / (n - 9) * np.diag(np.linalg.inv(white.T @ white))
-        added = covariance_by_bends(up, residual, sigma, np.zeros((n, 0)), GRAVITY)
-        # Errors of the nine relative parameters without bends as parameters and with them.
-        before.append(found / np.sqrt(alone))
+        noise = np.diag(np.linalg.inv(white.T @ white))
+        alone = np.sum((residual / sigma) ** 2) / (n - 9) * noise
+        added = _core.nonlinearity_covariance(up, residual / GRAVITY, sigma / GRAVITY)
+        # Errors of the nine relative parameters by noise, and with nonlinear axes as parameters.
+        before.append(found / np.sqrt(alone if name is None else noise))
         after.append(found / np.sqrt(alone + np.diag(added)))
     # Nine parameters of one session go together: a session counts once, by the share of its nine.
     covered = float(np.mean(np.abs(after) < 1.96))
@@ -239,5 +246,5 @@ def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
     pairs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
     up = np.array([np.insert([a, b], k, 0.0) for k in range(3) for a, b in pairs]) / np.sqrt(2.0)
     residual = np.random.default_rng(3).normal(size=12) * 4e-4
-    added = covariance_by_bends(up, residual, np.full(12, 4e-4), np.zeros((12, 0)), GRAVITY)
+    added = _core.nonlinearity_covariance(up, residual / GRAVITY, np.full(12, 4e-4 / GRAVITY))
     assert 2e-4 < np.sqrt(np.diag(added)[:6].max()) < 3e-3

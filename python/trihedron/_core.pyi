@@ -31,6 +31,7 @@ def fit_norm(readings: FloatArray, noise: FloatArray, gravity_m_s2: float) -> No
 def fit_norm_held_out(
     readings: FloatArray, noise: FloatArray, gravity_m_s2: float, fit: NormFit, folds: Sequence[int]
 ) -> FloatArray: ...
+def nonlinearity_covariance(up: FloatArray, error: FloatArray, sigma: FloatArray) -> FloatArray: ...
 
 # allan
 @final

@@ -27,9 +27,6 @@ pub const N_PARAMETERS: usize = 9;
 /// Parameters of the solver.
 type Parameters = SVector<f64, N_PARAMETERS>;
 
-/// `(row, column)` of the six free entries of `S`.
-const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-
 /// A fitted triad.
 #[derive(Debug, Clone)]
 pub struct Fit {

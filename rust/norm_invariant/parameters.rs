@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::{ENTRIES, Model, N_PARAMETERS, Parameters};
+use super::{Model, N_PARAMETERS, Parameters};
 use crate::ellipsoid::{self, Standardisation};
 use crate::error::{Error, Result};
+use crate::sensor_model::LOWER;
 
 /// The model with the same norms and a lower triangular `S`.
 ///
@@ -25,7 +26,7 @@ pub(super) fn pack(model: &Model, standard: &Standardisation) -> Parameters {
     let s = model.s * standard.size;
     let d = model.b + model.s * standard.centre;
     let mut theta = Parameters::zeros();
-    for (k, &(i, j)) in ENTRIES.iter().enumerate() {
+    for (k, &(i, j)) in LOWER.iter().enumerate() {
         theta[k] = s[(i, j)];
     }
     theta.fixed_rows_mut::<3>(6).copy_from(&d);
@@ -35,7 +36,7 @@ pub(super) fn pack(model: &Model, standard: &Standardisation) -> Parameters {
 /// `S` and `d` in standardised readings.
 pub(super) fn unpack_standardised(theta: &[f64]) -> Model {
     let mut s = Matrix3::zeros();
-    for (k, &(i, j)) in ENTRIES.iter().enumerate() {
+    for (k, &(i, j)) in LOWER.iter().enumerate() {
         s[(i, j)] = theta[k];
     }
     Model {
@@ -51,7 +52,7 @@ pub(super) fn unpack(theta: &[f64], standard: &Standardisation) -> Model {
 /// `∂(S row by row, b)/∂θ`: linear, because `b = d - S centre`.
 pub(super) fn map_to_entries(standard: &Standardisation) -> SMatrix<f64, 12, N_PARAMETERS> {
     let mut map = SMatrix::zeros();
-    for (k, &(row, column)) in ENTRIES.iter().enumerate() {
+    for (k, &(row, column)) in LOWER.iter().enumerate() {
         map[(3 * row + column, k)] = 1.0 / standard.size;
         map[(9 + row, k)] = -standard.centre[column] / standard.size;
     }

@@ -3,8 +3,9 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 
 use super::parameters::unpack_standardised;
-use super::{ANCHOR, ENTRIES, Model, N_PARAMETERS, Parameters, Readings, UNKNOWN};
+use super::{ANCHOR, Model, N_PARAMETERS, Parameters, Readings, UNKNOWN};
 use crate::ellipsoid::Standardisation;
+use crate::sensor_model::LOWER;
 
 /// Least volume of `S` as a part of the start's: below it lies the minimum `S = 0, |b| = |g|`.
 pub(super) const SMALLEST_VOLUME: f64 = 1e-2;
@@ -189,7 +190,7 @@ pub fn residual_gradient(f: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, N_P
 /// Derivatives of `along · (S u + b)` with respect to the solver's parameters.
 fn columns(along: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, N_PARAMETERS> {
     let mut slope = SVector::<f64, N_PARAMETERS>::zeros();
-    for (k, &(i, j)) in ENTRIES.iter().enumerate() {
+    for (k, &(i, j)) in LOWER.iter().enumerate() {
         slope[k] = along[i] * u[j];
     }
     slope.fixed_rows_mut::<3>(6).copy_from(along);

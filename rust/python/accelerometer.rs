@@ -1,9 +1,12 @@
 //! Bindings of the accelerometer fits.
 
+use nalgebra::Vector3;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_vectors, flat3, matrices3, rows};
+use crate::nonlinearity;
 use crate::norm_invariant::{self, Fit, Readings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -11,6 +14,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<NormFit>()?;
     module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
     module.add_function(wrap_pyfunction!(fit_norm_held_out, module)?)?;
+    module.add_function(wrap_pyfunction!(nonlinearity_covariance, module)?)?;
     Ok(())
 }
 
@@ -132,4 +136,23 @@ fn fit_norm_held_out<'py>(
             .collect::<Vec<f64>>())
     })?;
     rows(py, &flat, 3)
+}
+
+/// Covariance `(9, 9)` of relative errors of `S` and `b` by nonlinear axes, from unit verticals `(n, 3)`, gravity errors
+/// and their noise `(n,)`, in units of |g|.
+#[pyfunction]
+fn nonlinearity_covariance<'py>(
+    py: Python<'py>,
+    up: PyReadonlyArray2<'py, f64>,
+    error: Vec<f64>,
+    sigma: Vec<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let up: Vec<Vector3<f64>> = as_vectors(&flat3("up", &up)?).to_vec();
+    if (error.len(), sigma.len()) != (up.len(), up.len()) {
+        return Err(PyValueError::new_err(
+            "every vertical needs an error and its noise",
+        ));
+    }
+    let found = super::run(py, || nonlinearity::added_to_norm_fit(&up, &error, &sigma))?;
+    rows(py, found.as_slice(), 9)
 }

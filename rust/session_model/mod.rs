@@ -52,8 +52,6 @@ pub const N_POSE: usize = 8;
 pub const N_SCATTER: usize = 4;
 /// Unknowns of a pose with scatter: also the part of either bias that belongs to this pose alone (3 each).
 pub const N_POSE_SCATTER: usize = 14;
-/// `(row, column)` of the free elements of the accelerometer's `S`.
-pub const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// Means of one sensor over the static poses, raw and centred.
 #[derive(Debug, Clone)]

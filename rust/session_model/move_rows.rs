@@ -11,9 +11,10 @@ use super::response::{Response, Sums, effect_columns, loosened, respond, sums};
 use super::rows::{Domain, Group, Kind};
 use super::sample_noise::widened;
 use super::{
-    Distortion, LOWER, N_MODEL, N_POSE_SCATTER, N_SCATTER, Session, State, Strengths, tangent_plane,
+    Distortion, N_MODEL, N_POSE_SCATTER, N_SCATTER, Session, State, Strengths, tangent_plane,
 };
 use crate::error::{Error, Result};
+use crate::sensor_model::LOWER;
 
 /// `L⁻¹` of a move's covariance `L Lᵀ`.
 pub type Whitening = SMatrix<f64, N_MOVE, N_MOVE>;

@@ -1,15 +1,16 @@
-//! Uncertainty over all ways in which the accelerometer's bias may scatter and walk, not only the most likely one
-//! (docs/model-session.md, 11.12b).
+//! Uncertainty over all ways in which the accelerometer's bias may scatter and walk, and its axes be nonlinear, not only
+//! the most likely one (docs/model-session.md, 11.12b, 11.12c).
 
-use nalgebra::DVector;
+use nalgebra::{Cholesky, DMatrix};
 use rayon::prelude::*;
 
 use super::factor::Factor;
 use super::fit::{Fit, RIDGE};
 use super::hypothesis::Hypothesis;
 use super::strength_search::NO_SCATTER;
-use super::{Session, Strengths};
-use crate::error::Result;
+use super::{Distortion, Session, Strengths};
+use crate::error::{Error, Result};
+use crate::nonlinearity::{self, Beside, COLLECTED, N_COEFFICIENTS};
 
 /// Scatters that the uncertainty allows for, in units of the reference, together as likely a priori as none, and corner
 /// times of the walk beside them, s; and factors on the most likely value of either.
@@ -22,13 +23,6 @@ const NONE_ALL_THE_SAME: f64 = 0.1;
 const EXPECTED_TO: f64 = 0.4;
 /// Weight relative to the best below which a possibility does not change the uncertainty.
 const LEAST_WEIGHT: f64 = 1e-2;
-
-/// One possible scatter of the bias: its weight, the step that the fit would make, its normal equations.
-pub(super) struct Possible {
-    pub weight: f64,
-    pub step: DVector<f64>,
-    pub factor: Factor,
-}
 
 /// Scatters and the logarithm of their prior probabilities (11.12b, 11.12d).
 fn scatters_beforehand(expected: f64) -> Vec<(f64, f64)> {
@@ -48,16 +42,78 @@ fn scatters_beforehand(expected: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Possible scatters and walks of the accelerometer's bias, weighted by their evidence (11.12b); empty where the model
-/// has no scatter.
-///
-/// Some twenty lengths of gravity less nine unknowns detect a scatter as large as their noise in half of all sessions
-/// only: an uncertainty from the most likely scatter alone is too small there.
-pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Possible>> {
-    if session.scatter.is_none() {
-        return Ok(Vec::new());
+impl Fit {
+    /// Covariance of parameters that are linear in the unknowns by `map` `(unknowns, parameters)`, over possible scatters
+    /// and walks of the accelerometer's bias, and nonlinear axes beside each, weighted by their evidence (11.12b, 11.12c).
+    ///
+    /// Some twenty lengths of gravity less nine unknowns detect a scatter as large as their noise in half of all sessions
+    /// only: an uncertainty from the most likely scatter alone is too small there.
+    ///
+    /// # Errors
+    /// When a possible scatter of the biases leaves the session undetermined.
+    pub(super) fn possible_covariance(
+        &self,
+        session: &Session,
+        map: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>> {
+        if session.scatter.is_none() {
+            return Ok(self.factor.inner(map));
+        }
+        let bends = session.nonlinear_axes(self)?;
+        let hypothesis = Hypothesis::of(self, &bends, &[COLLECTED; N_COEFFICIENTS])?;
+        let tried = tried(self, session, &hypothesis);
+        let values = tried.iter().map(|(value, _)| *value);
+        let best = values.fold(f64::NEG_INFINITY, f64::max);
+        let likely = tried
+            .into_par_iter()
+            .filter(|(value, _)| *value - best >= LEAST_WEIGHT.ln());
+        let found = likely
+            .map(|(value, at)| {
+                let (chain, side) = hypothesis.system(&at)?;
+                let found = beside_bends(&chain.factor(RIDGE, None)?, map, &side)?;
+                Ok((value + found.0, found.1))
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let values = found.iter().map(|(value, _)| *value);
+        let best = values.fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = found.iter().map(|(value, _)| (value - best).exp()).sum();
+        let n = map.ncols();
+        Ok(found
+            .into_iter()
+            .fold(DMatrix::zeros(n, n), |sum, (value, one)| {
+                sum + one * ((value - best).exp() / total)
+            }))
     }
-    let hypothesis = Hypothesis::of(fit, &[], &[])?;
+}
+
+impl Session {
+    /// Columns of nonlinear axes, whitened as the rows of a fit are (11.7, 11.12c).
+    fn nonlinear_axes(&self, fit: &Fit) -> Result<Vec<DMatrix<f64>>> {
+        let at_rest = fit.state.up.iter().copied();
+        let moving = fit.passed.iter().flat_map(|one| &one.carried.force);
+        let force = at_rest
+            .chain(moving.map(|f| f / self.gravity))
+            .flat_map(|x| {
+                let columns = nonlinearity::columns(&x) * self.gravity;
+                columns.transpose().as_slice().to_vec()
+            });
+        let distortion = Distortion {
+            force: Some(force.collect()),
+            k: N_COEFFICIENTS,
+            ..Distortion::default()
+        };
+        self.columns(
+            &fit.state,
+            &fit.groups,
+            &fit.weights,
+            &fit.passed,
+            &distortion,
+        )
+    }
+}
+
+/// Log-evidence of possible scatters and walks, with all coefficients of nonlinear axes free.
+fn tried(fit: &Fit, session: &Session, hypothesis: &Hypothesis) -> Vec<(f64, Strengths)> {
     let unlikely = -(SCATTERS.len() as f64).ln();
     let mut scatters = scatters_beforehand(session.expected_scatter);
     if fit.strengths.scatter[0] > SCATTERS[SCATTERS.len() - 1] {
@@ -82,28 +138,48 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
             each.collect()
         })
         .collect();
-    let tried = tried.concat();
-    let values = tried.iter().map(|(value, _)| *value);
-    let best = values.fold(f64::NEG_INFINITY, f64::max);
-    let likely = tried
-        .into_par_iter()
-        .map(|(value, at)| ((value - best).exp(), at))
-        .filter(|(weight, _)| *weight >= LEAST_WEIGHT);
-    let mut out = likely
-        .map(|(weight, at)| {
-            let (chain, side) = hypothesis.system(&at)?;
-            let factor = chain.factor(RIDGE, None)?;
-            let step = -factor.solve(&side).column(0).into_owned();
-            Ok(Possible {
-                weight,
-                step,
-                factor,
-            })
-        })
-        .collect::<Result<Vec<_>>>()?;
-    let total: f64 = out.iter().map(|one| one.weight).sum();
-    for one in &mut out {
-        one.weight /= total;
-    }
-    Ok(out)
+    tried.concat()
+}
+
+/// Gain in log-evidence by nonlinear axes of unknown strength in place of free ones, the last unknowns of the border, and
+/// the second moment of the errors of parameters `map` about those of the fit.
+fn beside_bends(
+    factor: &Factor,
+    map: &DMatrix<f64>,
+    gradient: &DMatrix<f64>,
+) -> Result<(f64, DMatrix<f64>)> {
+    let (n, k, border) = (map.ncols(), N_COEFFICIENTS, factor.layout.border);
+    let mut side = DMatrix::zeros(gradient.nrows(), n + k + 1);
+    let (before, after) = (border - k, gradient.nrows() - border);
+    side.view_mut((0, 0), (before, n))
+        .copy_from(&map.rows(0, before));
+    side.view_mut((border, 0), (after, n))
+        .copy_from(&map.rows(before, after));
+    side.view_mut((before, n), (k, k)).fill_with_identity();
+    side.column_mut(n + k).copy_from(&gradient.column(0));
+    let found = factor.inner(&side);
+    let estimate = -found.view((n, n + k), (k, 1)).column(0);
+    let half = Cholesky::new(found.view((n, n), (k, k)).into_owned())
+        .ok_or_else(|| Error::not_determined("a nonlinearity is not finite"))?;
+    let with_prior = half.inverse();
+    let slope = &with_prior * &estimate;
+    let weight = COLLECTED.powi(-2);
+    let shift = found.view((0, n), (n, k)) * &with_prior;
+    let log_det: f64 = half
+        .l_dirty()
+        .diagonal()
+        .map(|d| (d / COLLECTED).ln())
+        .sum();
+    let of_free = 0.5 * slope.dot(&estimate) + log_det;
+    let covariance = found.view((0, 0), (n, n)) - &shift * found.view((n, 0), (k, n));
+    let step = -found.view((0, n + k), (n, 1)) - &shift * &estimate;
+    let beside = Beside {
+        information: with_prior - DMatrix::identity(k, k) * weight,
+        slope,
+        shift,
+    };
+    let bends = beside.marginal()?;
+    let cross = &step * bends.mean.transpose();
+    let second = covariance + &step * step.transpose() + &cross + cross.transpose() + bends.second;
+    Ok((bends.gain - of_free, second))
 }

@@ -5,11 +5,11 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
 use super::chain::{Chain, Layout};
 use super::fit::{Fit, gradient};
-use super::possible::possible_scatters;
 use super::rows::{Domain, Group};
 
-use super::{LOWER, N_POSE_SCATTER, Session, State};
+use super::{N_POSE_SCATTER, Session, State};
 use crate::error::Result;
+use crate::sensor_model::LOWER;
 
 /// Domains that are tested: all but the prior.
 pub const N_DOMAINS: usize = 4;
@@ -107,16 +107,7 @@ impl Fit {
                 }
             }
         }
-        let mut covariance = DMatrix::zeros(24, 24);
-        let possible = possible_scatters(self, session)?;
-        for one in &possible {
-            let shift = map.tr_mul(&one.step);
-            covariance += one.factor.inner(&map) * one.weight;
-            covariance.ger(one.weight, &shift, &shift, 1.0);
-        }
-        if possible.is_empty() {
-            covariance = self.factor.inner(&map);
-        }
+        let mut covariance = self.possible_covariance(session, &map)?;
         let mut corner = covariance.view_mut((21, 21), (3, 3));
         corner += beyond;
         let covariance = (&covariance + covariance.transpose()) * 0.5;

@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::chain::{Layout, Rows};
 use super::rows::{Domain, Group, Kind};
-use super::{Distortion, LOWER, N_MODEL, Session, State, StaticMeans, tangent_plane};
+use super::{Distortion, N_MODEL, Session, State, StaticMeans, tangent_plane};
 use crate::error::{Error, Result};
+use crate::sensor_model::LOWER;
 
 impl Session {
     /// (11.1), (11.2): the raw mean less the reading predicted by the model.

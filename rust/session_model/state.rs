@@ -3,7 +3,8 @@
 use nalgebra::{DVector, Matrix3, Matrix3x2, SVector, Vector3};
 
 use super::chain::Layout;
-use super::{LOWER, N_MODEL, N_POSE_SCATTER};
+use super::{N_MODEL, N_POSE_SCATTER};
+use crate::sensor_model::LOWER;
 
 /// Effects in the corrected readings, linear in their parameters.
 #[derive(Debug, Clone, Default)]

@@ -13,7 +13,7 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, require_poses, segments_of
 from trihedron.arrays import FloatArray
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.accelerometer.bending import with_bending, with_shapes
+from trihedron.estimate.accelerometer.bending import with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
@@ -154,8 +154,6 @@ def calibrate(
             # Serious findings about the log come before the error of the fit.
             grave = [f"{one.seen} {one.action}" for one in recording.findings if one.severity is Severity.SERIOUS]
             raise InputError(" ".join((*grave, *(["As it is:"] if grave else []), str(error)))) from None
-    if calibration.accelerometer.method != "joint":
-        calibration = with_bending(calibration, segments)
     calibration = in_frame(calibration, wanted)
     if turns_deg is not None and method != "faces":
         calibration = on_stated_turns(calibration, recording, segments, turns_deg)

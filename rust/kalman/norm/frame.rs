@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::sensor_model::LOWER;
+
 /// The body frame, which the norm of a vector determines only up to a rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frame {
@@ -11,15 +13,12 @@ pub enum Frame {
     Symmetric,
 }
 
-/// Row and column of each of the six parameters of `S`.
-const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-
 impl Frame {
     /// `S` and `b` of nine parameters.
     #[must_use]
     pub fn unpack(self, theta: &[f64]) -> (Matrix3<f64>, Vector3<f64>) {
         let mut s = Matrix3::zeros();
-        for (value, (i, j)) in theta.iter().zip(ENTRIES) {
+        for (value, (i, j)) in theta.iter().zip(LOWER) {
             s[(i, j)] = *value;
             if self == Self::Symmetric {
                 s[(j, i)] = *value;
@@ -30,7 +29,7 @@ impl Frame {
 
     /// Derivative of `u·(S a + b)` with respect to the nine parameters.
     pub(super) fn row(self, u: &Vector3<f64>, a: &Vector3<f64>, row: &mut [f64]) {
-        for (value, (i, j)) in row.iter_mut().zip(ENTRIES) {
+        for (value, (i, j)) in row.iter_mut().zip(LOWER) {
             *value = u[i] * a[j];
             if self == Self::Symmetric && i != j {
                 *value += u[j] * a[i];

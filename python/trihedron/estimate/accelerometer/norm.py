@@ -84,6 +84,8 @@ def _assemble(
     else:
         turn = np.concatenate([np.tile(signs, 3), np.ones(3)])
         covariance = fit.covariance * np.outer(turn, turn) * scale
+        wrt = wrt_relative_errors(S, fit.b, g)
+        covariance += wrt @ _core.nonlinearity_covariance(up, residual / g, sigma / g) @ wrt.T
     observability = design.observability(relative_sigma)
     quality = replace(
         gravity_quality(residual, sigma, dof, (apart[:, 0], apart[:, 1])),

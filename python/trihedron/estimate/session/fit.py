@@ -80,17 +80,6 @@ class SessionSolution:
         return replace(measured, rate=rate - measured.shared_errors @ shared, bias=measured.bias - place)
 
     @property
-    def accel_drift(self) -> FloatArray:
-        """Curves along which the accelerometer's bias changes from pose to pose (n, 3, k), one prior σ each [m/s²]:
-        those of time, and every step of its random walk (eq. 11.8)."""
-        observed, of = self.observed, self.observed.causes.get("accel-bias-drift", slice(0))
-        curves = self.S_a @ observed.force_effect[: observed.n_poses, :, of] * observed.effect_sigma[of]
-        step = np.sqrt(3.0 * np.diff(observed.pose_time_s)) / self.core.strengths[0][0]
-        later = np.tri(len(step) + 1, len(step), -1) * step
-        walk = np.einsum("nk,ij->nikj", later, self.S_a * observed.force_density)
-        return np.concatenate([curves, walk.reshape(len(later), 3, -1)], axis=2)
-
-    @property
     def g_sensitivity(self) -> tuple[FloatArray, FloatArray] | None:
         """G (3, 3) of the gyro's rate G f [(rad/s)/(m/s²)] with its standard errors, where it is likely."""
         of = self.observed.causes.get("gyro-g-sensitivity")

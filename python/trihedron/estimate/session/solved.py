@@ -8,7 +8,6 @@ import numpy as np
 from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.channel_facts.static_axes import find_low_passes
 from trihedron.errors import INPUT_ERRORS
-from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.verdict import residual_findings
 from trihedron.estimate.gyroscope.findings import describe, findings_of, worst_sigma
 from trihedron.estimate.gyroscope.lost_samples import (
@@ -271,7 +270,7 @@ def calibrate_joint(
     has_temperature = recording.temperature_degc is not None
     of_residual = residual_findings(quality.chi2, quality, *solution.accel_bias_change, has_temperature=has_temperature)
     still = [finding for finding in alone.findings if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE]
-    calibration = replace(
+    return replace(
         alone,
         accelerometer=replace(
             alone.accelerometer,
@@ -286,4 +285,3 @@ def calibrate_joint(
         findings=(*still, *of_residual, *found.findings),
         averaging=solution.averaging,
     )
-    return with_bending(calibration, segments, solution.accel_drift)

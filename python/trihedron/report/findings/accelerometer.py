@@ -68,13 +68,6 @@ ENTRIES = {
         "An accelerometer that is not linear, or one driven near its range limit.",
         "Run `trihedron diagnose LOG`: it looks for the effect.",
     ),
-    (Code.NONLINEAR_RESIDUAL, "not-excluded", WARNING): Words(
-        "The gravity error in static poses exceeds noise: bias repeatability or nonlinearity. Nonlinearity may put the "
-        "scale off by {scale_part:.2g %} (1 σ); the uncertainties of S and b include it and are up to {widening:.2g} "
-        "times as large.",
-        "Too few poses to separate the two, or an accelerometer that is not linear.",
-        "Log more poses (24 or more), spread over all directions; `trihedron diagnose` looks for the cause.",
-    ),
     (Code.LEFT_HANDED, "accelerometer", NOTE): Words(
         "The accelerometer's axes as stated form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
         "The documented axes of the board are left-handed, or one was stated wrong: poses alone do not determine "
