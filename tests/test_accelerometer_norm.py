@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom
 
 from trihedron import _core, calibrate
-from trihedron.estimate.accelerometer import bending
-from trihedron.estimate.accelerometer.bending import SHAPES
+from trihedron.estimate.accelerometer import nonlinear_shapes
+from trihedron.estimate.accelerometer.nonlinear_shapes import SHAPES
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gravity_error import norm_error
@@ -169,14 +169,14 @@ def drawn(rng, n):
 
 
 def test_sound_poses_have_a_shape_as_often_as_chance_says(monkeypatch):
-    monkeypatch.setattr(bending, "FALSE_ALARM", 0.05)
-    monkeypatch.setattr(bending, "MATTERS", 0.0)
+    monkeypatch.setattr(nonlinear_shapes, "FALSE_ALARM", 0.05)
+    monkeypatch.setattr(nonlinear_shapes, "MATTERS", 0.0)
     rng, said, n_trials = np.random.default_rng(3), 0, 600
     for _ in range(n_trials):
         up, sigma = drawn(rng, int(rng.integers(16, 45)))
         # Noise twice as large as stated: an F needs no size of it.
         residual, _ = linear_fit(up, 2.0 * sigma * rng.normal(size=len(up)), sigma)
-        said += bending.shape_of(up, residual, sigma, GRAVITY, 4.0) is not None
+        said += nonlinear_shapes.shape_of(up, residual, sigma, GRAVITY, 4.0) is not None
     # Bonferroni over three shapes that are much alike: at most the stated rate.
     assert said <= binom.ppf(0.999, n_trials, 0.05)
     assert said >= binom.ppf(0.001, n_trials, 0.05 / 3.0)
@@ -190,7 +190,7 @@ def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, power):
     bent = up**power @ size + sigma * rng.normal(size=len(up))
     residual, found = linear_fit(up, bent, sigma)
     _, clean = linear_fit(up, bent - up**power @ size, sigma)
-    shape = bending.shape_of(up, residual, sigma, GRAVITY, 1.0)
+    shape = nonlinear_shapes.shape_of(up, residual, sigma, GRAVITY, 1.0)
     assert shape is not None
     assert shape.names[0] == name
     assert shape.p < 1e-6

@@ -13,9 +13,9 @@ from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, require_poses, segments_of
 from trihedron.arrays import FloatArray
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.accelerometer.bending import with_shapes
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
+from trihedron.estimate.accelerometer.nonlinear_shapes import with_shapes
 from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
 from trihedron.estimate.gravity_circle import opposite_headings
 from trihedron.estimate.gyroscope.common_scale import scale_findings, without_first_scale
