@@ -130,57 +130,73 @@ fn strengths() -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Covariance `(9, 9)` that nonlinear axes add to a fit of the lengths of gravity alone: relative errors of the lower
-/// triangle of S, row by row, and of b; from unit verticals, errors of the lengths and their noise, in units of |g|.
-/// Scatter of the bias of any size may explain the errors as well.
+/// Second moment `(9, 9)` of the errors of a fit of lengths of gravity: relative errors of the lower triangle of S, row by
+/// row, and of b; from unit verticals, residuals of the lengths and their noise, in units of |g|. Biases may scatter from
+/// pose to pose by any amount, axes be nonlinear beside each (11.12b, 11.12c); `prior` is the standard deviation of the
+/// parameters beforehand, if any.
 ///
 /// # Errors
 /// When the poses do not determine nine parameters.
-pub fn added_to_norm_fit(
+pub fn norm_fit_covariance(
     up: &[Vector3<f64>],
-    error: &[f64],
+    residual: &[f64],
     sigma: &[f64],
+    prior: Option<f64>,
 ) -> Result<DMatrix<f64>> {
-    let design = DMatrix::from_fn(up.len(), 9, |i, c| {
-        LOWER
-            .get(c)
-            .map_or_else(|| up[i][c - LOWER.len()], |&(j, k)| up[i][j] * up[i][k])
+    let design = DMatrix::from_fn(up.len(), 9, |i, c| match LOWER.get(c) {
+        Some(&(j, k)) => up[i][j] * up[i][k],
+        None => up[i][c - LOWER.len()],
     });
-    let error = DVector::from_column_slice(error);
     let bends = DMatrix::from_fn(up.len(), N_COEFFICIENTS, |i, c| {
         up[i].dot(&columns(&up[i]).column(c))
     });
+    let residual = DVector::from_column_slice(residual);
     let mut usual = sigma.to_vec();
     usual.sort_by(f64::total_cmp);
     let usual = usual[usual.len() / 2];
+    let known = prior.map_or(0.0, |sigma| sigma.powi(-2));
+    let mut at_fit = None;
     let mut found = Vec::new();
     for i in 0..N_SCATTERS {
-        let scatter = if i == 0 {
-            0.0
-        } else {
-            usual * 2f64.powf(0.5 * f64::from(i) - 2.5)
+        let scatter = match i {
+            0 => 0.0,
+            _ => usual * 2f64.powf(0.5 * f64::from(i) - 2.5),
         };
         let white =
             DVector::from_iterator(sigma.len(), sigma.iter().map(|s| s.hypot(scatter).recip()));
         let by = |of: &DMatrix<f64>| {
             DMatrix::from_fn(of.nrows(), of.ncols(), |r, c| of[(r, c)] * white[r])
         };
-        let (x, b, r) = (by(&design), by(&bends), error.component_mul(&white));
-        let half = Cholesky::new(x.tr_mul(&x))
+        let (x, b, r) = (by(&design), by(&bends), residual.component_mul(&white));
+        let half = Cholesky::new(x.tr_mul(&x) + DMatrix::identity(9, 9) * known)
             .ok_or_else(|| Error::not_determined("the poses do not determine nine parameters"))?;
+        // At the noise of the fit this is balanced by the prior.
+        let pull = x.tr_mul(&r);
+        let pull = &pull - &*at_fit.get_or_insert_with(|| pull.clone());
+        let step = half.solve(&pull);
         let shift = -half.solve(&x.tr_mul(&b));
-        let own = half.solve(&x.tr_mul(&r));
-        let left = b + &x * &shift;
-        let r = r - &x * own;
+        let left = &b + &x * &shift;
         let beside = Beside {
-            information: left.tr_mul(&left),
-            slope: left.tr_mul(&r),
+            information: b.tr_mul(&left),
+            slope: b.tr_mul(&(&r - &x * &step)),
             shift,
         };
         let log_det: f64 = half.l_dirty().diagonal().map(f64::ln).sum();
-        let alone = white.map(f64::ln).sum() - log_det - 0.5 * r.norm_squared();
-        let one = beside.marginal()?;
-        found.push((alone + one.gain, one.second));
+        let beforehand = if i == 0 {
+            0.0
+        } else {
+            -f64::from(N_SCATTERS - 1).ln()
+        };
+        let explained = step.dot(&pull);
+        let alone = white.map(f64::ln).sum() - log_det - 0.5 * (r.norm_squared() - explained);
+        let with_bends = beside.marginal()?;
+        let cross = &step * with_bends.mean.transpose();
+        let second = half.inverse()
+            + &step * step.transpose()
+            + &cross
+            + cross.transpose()
+            + with_bends.second;
+        found.push((beforehand + alone + with_bends.gain, second));
     }
     let most = found
         .iter()

@@ -108,7 +108,6 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
     if run == 3:
         # Noise along the vertical is 0.9 mm/s², the norms stray by twice that: biases differ between the poses.
         assert quality.chi2 > high
-        assert quality.covariance_scale > 1.0
     else:
         assert low < quality.chi2 < high
 

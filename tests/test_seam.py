@@ -122,7 +122,7 @@ noise = _core.RateNoise(np.full(3, 1e-4), 1e-4, 0.01)
 out += _core.integrate_moves(t, w, edges, anchors, np.eye(3) * 1.01, zero, zero, 3, noise)
 for few in (readings[:37], readings[:2000]):
     fit = _core.fit_norm(few, 1e-6 * np.eye(3)[None], 9.8)
-    out += [fit.S, fit.b, fit.covariance / fit.covariance.max(), fit.residuals]
+    out += [fit.S, fit.b, fit.residuals]
 print(json.dumps(np.concatenate([np.ravel(part) for part in out]).tolist()))
 """
 

@@ -17,7 +17,6 @@ ANCHOR: float
 class NormFit:
     S: FloatArray
     b: FloatArray
-    covariance: FloatArray
     residuals: FloatArray
     sigmas: FloatArray
     chi2: float
@@ -31,7 +30,9 @@ def fit_norm(readings: FloatArray, noise: FloatArray, gravity_m_s2: float) -> No
 def fit_norm_held_out(
     readings: FloatArray, noise: FloatArray, gravity_m_s2: float, fit: NormFit, folds: Sequence[int]
 ) -> FloatArray: ...
-def nonlinearity_covariance(up: FloatArray, error: FloatArray, sigma: FloatArray) -> FloatArray: ...
+def norm_fit_covariance(
+    up: FloatArray, residual: FloatArray, sigma: FloatArray, prior: float | None = None
+) -> FloatArray: ...
 
 # allan
 @final

@@ -14,7 +14,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<NormFit>()?;
     module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
     module.add_function(wrap_pyfunction!(fit_norm_held_out, module)?)?;
-    module.add_function(wrap_pyfunction!(nonlinearity_covariance, module)?)?;
+    module.add_function(wrap_pyfunction!(norm_fit_covariance, module)?)?;
     Ok(())
 }
 
@@ -35,12 +35,6 @@ impl NormFit {
     #[getter]
     fn b<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.0.model.b.as_slice().to_pyarray(py)
-    }
-
-    /// Covariance (12, 12) of S row by row, then b.
-    #[getter]
-    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        rows(py, self.0.covariance.as_slice(), 12)
     }
 
     /// Residuals (n,), m/s².
@@ -138,21 +132,23 @@ fn fit_norm_held_out<'py>(
     rows(py, &flat, 3)
 }
 
-/// Covariance `(9, 9)` of relative errors of `S` and `b` by nonlinear axes, from unit verticals `(n, 3)`, gravity errors
-/// and their noise `(n,)`, in units of |g|.
+/// Covariance `(9, 9)` of relative errors of `S` and `b`, from unit verticals `(n, 3)`, gravity errors and their noise
+/// `(n,)` in units of |g|; `prior` is their standard deviation beforehand, if any.
 #[pyfunction]
-fn nonlinearity_covariance<'py>(
+#[pyo3(signature = (up, residual, sigma, prior=None))]
+fn norm_fit_covariance<'py>(
     py: Python<'py>,
     up: PyReadonlyArray2<'py, f64>,
-    error: Vec<f64>,
+    residual: Vec<f64>,
     sigma: Vec<f64>,
+    prior: Option<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let up: Vec<Vector3<f64>> = as_vectors(&flat3("up", &up)?).to_vec();
-    if (error.len(), sigma.len()) != (up.len(), up.len()) {
+    if (residual.len(), sigma.len()) != (up.len(), up.len()) {
         return Err(PyValueError::new_err(
-            "every vertical needs an error and its noise",
+            "every vertical needs a residual and its noise",
         ));
     }
-    let found = super::run(py, || nonlinearity::added_to_norm_fit(&up, &error, &sigma))?;
-    rows(py, found.as_slice(), 9)
+    let fit = || nonlinearity::norm_fit_covariance(&up, &residual, &sigma, prior);
+    rows(py, super::run(py, fit)?.as_slice(), 9)
 }

@@ -48,8 +48,7 @@ class FitQuality(Frozen):
     ``held_out`` has the shape of ``residual``: the same quantity predicted by a fit that did not see that pose or move
     (k-fold), ``held_out_sigma`` its prediction error. ``rms_dof`` is the rms per degree of freedom, ``floor`` the rms
     that noise alone would give. ``angle_deg`` (m,), gyro only: angle between predicted and measured gravity after each
-    move, in sample; ``held_out_angle_deg`` (m,) the same held out. ``covariance_scale`` is the factor by which the
-    covariance of the stated noise was multiplied because the residuals exceed that noise; 1 when they do not.
+    move, in sample; ``held_out_angle_deg`` (m,) the same held out.
     ``static_rate_rms``, gyro only: rate in static poses less the bias of the other poses, rms over poses and axes
     [rad/s], and ``static_rate_floor`` what noise alone would give.
     """
@@ -70,7 +69,6 @@ class FitQuality(Frozen):
     weights: FloatArray | None = None
     n_iterations: int = 0
     stopped_because: str = ""
-    covariance_scale: float = 1.0
     static_rate_rms: float | None = None
     static_rate_floor: float | None = None
 

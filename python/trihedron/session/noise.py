@@ -294,8 +294,7 @@ def bias_drift(calibration: Calibration, segments: Segments, n: int) -> FloatArr
     if quality is not None and segments.accelerometer_mean is not None and len(quality.residual) > 3:
         up = directions_of(segments.accelerometer_mean @ accel.S.T + accel.b)
         if len(up) == len(quality.residual):
-            noise = quality.sigma**2 / max(quality.covariance_scale, 1.0)
-            out[:3] = between_sessions(quality.residual, noise, np.einsum("ij,ij->i", up[1:], up[:-1]))
+            out[:3] = between_sessions(quality.residual, quality.sigma**2, np.einsum("ij,ij->i", up[1:], up[:-1]))
     if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
         biases = segments.gyroscope_mean @ gyro.S.T
         noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T

@@ -43,7 +43,7 @@ def shape_of(
     """Shapes with p below ``FALSE_ALARM`` that shift a parameter by more than ``MATTERS`` σ, or ``None``.
 
     ``up`` (n, 3) are unit verticals, ``residual``, ``sigma`` (n,) gravity errors in static poses after the fit and
-    their noise [m/s²]; ``scale`` is the χ² per degree of freedom by which the covariance of S and b is widened.
+    their noise [m/s²]; ``scale`` is the χ² per degree of freedom of the fit, at least 1.
     """
     white = 1.0 / sigma[:, None]
     linear = design_rows(up) * gravity_m_s2 * white
@@ -84,7 +84,7 @@ def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, 
         return calibration.findings
     seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # excluded poses have no residual
     up = directions_of(correct(reading, fitted.S, fitted.b))[is_known]
-    scale = max(seen.covariance_scale, seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
+    scale = max(seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
     shape = shape_of(up, seen.residual[is_known], seen.sigma[is_known], calibration.gravity_m_s2, scale)
     if shape is None:
         return calibration.findings

@@ -76,23 +76,17 @@ def _assemble(
     up = directions_of(f)
     residual, sigma, chi2 = fit.residuals, fit.sigmas, fit.chi2
     dof = len(values) - N_PARAMETERS
-    scale = verdict.covariance_scale(chi2, dof)
     design = PoseDesign.of(up, sigma / g)
     relative_sigma = float(np.median(sigma)) / g
-    if fit.is_anchored:
-        covariance = _anchored_covariance(design.information / scale, S, fit.b, g)
-    else:
-        turn = np.concatenate([np.tile(signs, 3), np.ones(3)])
-        covariance = fit.covariance * np.outer(turn, turn) * scale
-        wrt = wrt_relative_errors(S, fit.b, g)
-        covariance += wrt @ _core.nonlinearity_covariance(up, residual / g, sigma / g) @ wrt.T
+    wrt = wrt_relative_errors(S, fit.b, g)
+    prior = _core.ANCHOR if fit.is_anchored else None
+    covariance = wrt @ _core.norm_fit_covariance(up, residual / g, sigma / g, prior) @ wrt.T
     observability = design.observability(relative_sigma)
     quality = replace(
         gravity_quality(residual, sigma, dof, (apart[:, 0], apart[:, 1])),
         weights=np.ones(len(values)),
         n_iterations=fit.n_iterations,
         stopped_because=words(fit.stopped_because),
-        covariance_scale=scale,
     )
     findings = [
         *verdict.observability_findings(
@@ -162,13 +156,6 @@ def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> 
     along = np.einsum("ni,nij,nj->n", up, spread, up)
     sigma = np.sqrt(np.maximum(along, 1e-6 * total))
     return norm - g - (total - along) / (2.0 * g), sigma
-
-
-def _anchored_covariance(information: FloatArray, S: FloatArray, b: FloatArray, g: float) -> FloatArray:
-    """Covariance (12, 12) of S, b with the prior σ ``ANCHOR``, in |g|, on the nine relative errors (model.md, 3)."""
-    physical = np.linalg.inv(information + np.eye(9) / _core.ANCHOR**2)
-    jacobian = wrt_relative_errors(S, b, g)
-    return jacobian @ physical @ jacobian.T
 
 
 TO_CASE_RAD = 0.1

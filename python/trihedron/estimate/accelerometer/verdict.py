@@ -18,13 +18,6 @@ WEAK_PREDICTION = 3.0
 other to √(9/n) of the noise of a pose; three times that noise means that some direction is hardly determined."""
 
 
-def covariance_scale(chi2: float, dof: int) -> float:
-    """χ²/dof where χ² exceeds the 99 % quantile of noise alone, else 1: uncertainties are never reduced."""
-    if dof <= 0 or chi2 <= probability.chdtri(dof, SIGNIFICANCE):
-        return 1.0
-    return chi2 / dof
-
-
 def residual_findings(
     chi2: float,
     quality: FitQuality,
@@ -35,8 +28,7 @@ def residual_findings(
 ) -> Iterator[Finding]:
     """Finding where the stated noise does not explain the residuals; a fit of the session has a bias repeatability, and
     perhaps a drift, its range over the session, which a temperature in the log may explain."""
-    scale = covariance_scale(chi2, quality.dof)
-    if scale == 1.0:
+    if quality.dof <= 0 or chi2 <= probability.chdtri(quality.dof, SIGNIFICANCE):
         return
     is_held = quality.held_out_rms is not None
     rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
@@ -48,14 +40,13 @@ def residual_findings(
         rms_in_sample_m_s2=quality.rms,
         floor_m_s2=quality.floor,
         times_noise=rms / max(quality.floor, TINY),
-        chi2_per_dof=scale,
+        chi2_per_dof=chi2 / quality.dof,
         dof=quality.dof,
         is_joint=bias_repeatability_m_s2 is not None,
         bias_repeatability_m_s2=bias_repeatability_m_s2 or 0.0,
         is_drift=drift_m_s2 > 0.0,
         drift_m_s2=drift_m_s2,
         has_temperature=has_temperature,
-        widening=np.sqrt(scale),
         is_lone=quality.lone_pose is not None,
         lone=0 if quality.lone_pose is None else quality.lone_pose + 1,
     )

@@ -43,8 +43,6 @@ def norm_quality(solution: SessionSolution, held: tuple[FloatArray, FloatArray] 
         found,
         n_iterations=solution.iterations,
         stopped_because=solution.stopped_because,
-        # The covariance includes the error of one bias for the session under bias drift.
-        covariance_scale=max(found.chi2 / found.dof, 1.0) if solution.is_drifting and found.dof else 1.0,
     )
 
 

@@ -21,8 +21,7 @@ ENTRIES = {
         "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom)"
         "{is_lone:?, most of it in pose {lone}, which the other poses hardly determine|}. {is_joint:?The bias differs "
         "between poses by {bias_repeatability_m_s2:.2g mm/s²} rms per axis{is_drift:?, with a drift of "
-        "{drift_m_s2:.2g mm/s²} over the session|}; S, b and their standard uncertainties allow for it|"
-        "All standard uncertainties of the accelerometer are multiplied by {widening:.3g}}.",
+        "{drift_m_s2:.2g mm/s²} over the session|}; S, b and their|The} standard uncertainties allow for it.",
         "{is_drift:?The sensor warmed up, or its supply drifted|" + _UNQUIET + "}.",
         "{is_lone:?Record again with more poses near pose {lone} and in other directions (`trihedron plan`).|"
         + _LOOK
