@@ -22,6 +22,7 @@ const STRENGTHS: Strengths = Strengths {
     scatter: [1.0; 4],
     between: [0.6, 0.6],
     excess: [1.0, 1.0],
+    own: 0.5,
 };
 
 /// Groups of rows at a state, the moves with the weights that another one gives them.
@@ -153,6 +154,7 @@ fn strengths_are_sought_within_bounds_and_only_raise_the_likelihood() {
         corner_s: [50.0, 50.0],
         scatter: [2.0, 0.5],
         excess: [1.0, 1.0],
+        own: 0.5,
     };
     let tuned = |within: &Within| {
         tune(
