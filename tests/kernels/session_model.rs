@@ -154,7 +154,6 @@ fn strengths_are_sought_within_bounds_and_only_raise_the_likelihood() {
         corner_s: [50.0, 50.0],
         scatter: [2.0, 0.5],
         excess: [1.0, 1.0],
-        own: 0.5,
     };
     let tuned = |within: &Within| {
         tune(
