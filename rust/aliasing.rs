@@ -30,9 +30,7 @@ const MARGIN: f64 = 3.0;
 
 type Range = [usize; 2];
 
-/// Variance of the sum of the readings of every move by motion above half the sampling frequency: by its own power, and
-/// by the power that moves of the session usually have. A move's own says little where a tremor near the sampling
-/// frequency is hardly seen around half of it, and much of jolts.
+/// Variance of the sum of the readings of every move by motion above half the sampling frequency.
 ///
 /// The poses give the power of the noise in both bands (their median), which is subtracted; at least `rounding`, the
 /// variance of rounding, because a pose whose bias stays inside one LSB does not show its rounding, moves do. Filters run
@@ -43,7 +41,7 @@ pub fn unresolved(
     (moves, poses): (&[Range], &[Range]),
     gaps: &[usize],
     rounding: [f64; 3],
-) -> Vec<[[f64; 3]; 2]> {
+) -> Vec<[f64; 3]> {
     let poses: Vec<Range> = poses
         .iter()
         .copied()
@@ -59,7 +57,7 @@ pub fn unresolved(
                 .map(|(sum, &pose)| sum[axis] / windows(pose) as f64);
             median(&mut of.collect::<Vec<f64>>()).max(rounding[axis])
         });
-        let of_move = |own: &Vec<Range>| {
+        let of_move = |(own, &whole): (&Vec<Range>, &Range)| {
             let n = own
                 .iter()
                 .map(|&piece| windows(piece))
@@ -71,21 +69,18 @@ pub fn unresolved(
             std::array::from_fn(|axis| {
                 let sum: f64 = seen.iter().map(|one| one[axis]).sum();
                 let counted: usize = own.iter().map(|&piece| windows(piece)).sum();
-                (sum - usual * level[axis] * counted as f64).max(0.0) / n
+                // Samples across gaps are assumed to have the mean power of the move.
+                (sum - usual * level[axis] * counted as f64).max(0.0) * windows(whole) as f64 / n
             })
         };
-        pieces.iter().map(of_move).collect()
+        pieces.iter().zip(moves).map(of_move).collect()
     };
     let (at_half, at_quarter) = (power(AT_HALF), power(AT_QUARTER));
     let part = folded(&at_half, &at_quarter);
-    let usual: [f64; 3] = std::array::from_fn(|axis| {
-        median(&mut at_half.iter().map(|one| one[axis]).collect::<Vec<f64>>())
-    });
-    // Samples across gaps are assumed to have the mean power of the move.
-    let of_move = |(own, &whole): (&[f64; 3], &Range)| {
-        [own, &usual].map(|power| power.map(|value| value * part * windows(whole) as f64))
-    };
-    at_half.iter().zip(moves).map(of_move).collect()
+    at_half
+        .iter()
+        .map(|one| one.map(|value| value * part))
+        .collect()
 }
 
 /// Power folded onto zero over that at half the sampling frequency. The slope between the bands depends on filter and

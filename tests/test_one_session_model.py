@@ -230,7 +230,7 @@ def test_a_rate_that_steps_between_samples_is_charged_with_what_its_integral_mis
     charged = unresolved_variance(rate, ranges, poses, step, np.zeros(3))
     # 900 squares of a jump times a phase have a mean certain to 7 %: two of those, and a tenth for the width of the
     # band, over which a step's power is above that at its middle.
-    assert np.mean(missed**2) == pytest.approx(np.mean(charged[:, 0]), rel=0.25)
+    assert np.mean(missed**2) == pytest.approx(np.mean(charged), rel=0.25)
 
 
 def test_moves_left_out_at_a_limit_explain_only_what_they_disagree_by_more_than_others(real_data: Path) -> None:

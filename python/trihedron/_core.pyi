@@ -538,7 +538,7 @@ class SessionState:
     ) -> SessionState: ...
 
 _Pair = tuple[float, float]
-_Strengths = tuple[_Pair, tuple[float, float, float, float], _Pair, _Pair, float]
+_Strengths = tuple[_Pair, tuple[float, float, float, float], _Pair, _Pair]
 _Asked = tuple[FloatArray | None, FloatArray | None, list[float]]
 
 @final

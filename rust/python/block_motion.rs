@@ -1,12 +1,10 @@
 //! Bindings of motion in block means.
 
-use numpy::{
-    PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
-};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_rows, flat1, flat2, flat3, vector3};
+use super::arrays::{as_rows, flat1, flat2, flat3, rows, vector3};
 use super::ranges::ranges_within;
 use crate::aliasing;
 use crate::block_motion::{self, Edges, UNKNOWNS, Windows};
@@ -64,8 +62,8 @@ fn ends_to_trim(
     })
 }
 
-/// Variance `(m, 2, 3)` of the sums of `readings` `(n, 3)` over moves by motion faster than the samples, by their own power
-/// and by the usual one; `ranges` of moves and of poses, the first samples behind `gaps`, the variance of `rounding` `(3,)`.
+/// Variance `(m, 3)` of the sums of `readings` `(n, 3)` over moves by motion faster than the samples; `ranges` of moves
+/// and of poses, the first samples behind `gaps`, the variance of `rounding` `(3,)`.
 #[pyfunction]
 fn unresolved_power<'py>(
     py: Python<'py>,
@@ -73,7 +71,7 @@ fn unresolved_power<'py>(
     ranges: (PyReadonlyArray2<'py, i64>, PyReadonlyArray2<'py, i64>),
     gaps: Vec<usize>,
     rounding: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let flat = flat3("readings", &readings)?;
     let within = |one| ranges_within(one, flat.len() / 3);
     let (moves, poses) = (within(&ranges.0)?, within(&ranges.1)?);
@@ -82,8 +80,7 @@ fn unresolved_power<'py>(
         let spans = (moves.as_slice(), poses.as_slice());
         Ok(aliasing::unresolved(as_rows(&flat), spans, &gaps, rounding))
     })?;
-    let flat = found.as_flattened().as_flattened();
-    flat.to_pyarray(py).reshape([found.len(), 2, 3])
+    rows(py, found.as_flattened(), 3)
 }
 
 /// Coefficients `(12,)` by which the gyro best predicts the changes of windows, in units of `scale`.

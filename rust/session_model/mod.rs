@@ -172,8 +172,6 @@ pub struct Strengths {
     /// Factors on the standard errors of gravity after moves and of the velocity over them; below 1 on the part of
     /// motion faster than the samples.
     pub excess: [f64; 2],
-    /// Share that a move's own spectrum has in its motion faster than the samples; the usual spectrum has the rest.
-    pub own: f64,
 }
 
 impl Strengths {
@@ -183,7 +181,6 @@ impl Strengths {
         scatter: [0.0; N_SCATTER],
         between: [0.0; 2],
         excess: [1.0; 2],
-        own: 0.5,
     };
 }
 
@@ -194,8 +191,7 @@ impl Strengths {
         let pairs = (self.corner_s.iter().zip(&other.corner_s))
             .chain(self.scatter.iter().zip(&other.scatter))
             .chain(self.between.iter().zip(&other.between))
-            .chain(self.excess.iter().zip(&other.excess))
-            .chain([(&self.own, &other.own)]);
+            .chain(self.excess.iter().zip(&other.excess));
         pairs.fold(0.0, |most, (a, b)| most.max((a / b).ln().abs()))
     }
 }

@@ -134,7 +134,7 @@ impl Passed {
     /// Covariance of the residuals: noise of the samples, and biases that depart from the line between their poses.
     #[must_use]
     pub fn covariance(&self, strengths: &Strengths) -> MoveCovariance {
-        let mut out = widened(&self.response, strengths);
+        let mut out = widened(&self.response, strengths.excess);
         if let Some(loose) = &self.loose {
             for (s, loose) in loose.iter().enumerate() {
                 out += loose * (strengths.scatter[s] * strengths.between[s.min(1)]).powi(2);

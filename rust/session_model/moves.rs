@@ -39,7 +39,7 @@ pub struct Move {
     pub step_s: f64,
     /// Variance of the integrals of force and rate, (raw unit · s)², from motion faster than the samples; then from
     /// rounding, slow noise and poses that turn at their ends.
-    pub unresolved: [Vector3<f64>; 6],
+    pub unresolved: [Vector3<f64>; 4],
     /// Change of the vertical from the means of the poses before and after to its own ends.
     pub leans: [Vector3<f64>; 2],
     /// Steps over lost samples.
@@ -57,7 +57,7 @@ impl Move {
         rate: Vec<Vector3<f64>>,
         force: Vec<Vector3<f64>>,
         anchors_s: [f64; 2],
-        unresolved: [Vector3<f64>; 6],
+        unresolved: [Vector3<f64>; 4],
         first_point: usize,
     ) -> Self {
         let n = time_s.len();

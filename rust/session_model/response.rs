@@ -18,19 +18,10 @@ pub struct Response {
     pub by_force: Vec<Matrix3<f64>>,
     /// Covariance of the residuals from noise that is measured, not widened.
     pub covariance: MoveCovariance,
-    /// Covariance by motion faster than the samples, extrapolated from the spectrum of this move and of the usual one.
-    pub unresolved: [MoveCovariance; 2],
+    /// Covariance by motion faster than the samples, extrapolated from their spectrum.
+    pub unresolved: MoveCovariance,
     /// `g Tᵀ C` at the end.
     pub lever: Matrix2x3<f64>,
-}
-
-impl Response {
-    /// Whether motion faster than the samples has a `part` of the noise of gravity after the move.
-    pub(super) fn is_rough(&self, part: f64) -> bool {
-        let of_gravity = |one: &MoveCovariance| one[(0, 0)] + one[(1, 1)];
-        let [own, usual] = &self.unresolved;
-        of_gravity(own).max(of_gravity(usual)) > part * of_gravity(&self.covariance)
-    }
 }
 
 /// Derivatives of the residuals by every sample, and their covariance (11.5, 11.6).
@@ -102,12 +93,12 @@ pub fn respond(
             velocity.ger(var, &jump, &jump, 1.0);
         }
     }
-    let [white, own, usual] = of_samples(one, move_model, noise, &by_rate, &by_force);
+    let [white, unresolved] = of_samples(one, move_model, noise, &by_rate, &by_force);
     Response {
         by_rate,
         by_force,
         covariance: covariance + white,
-        unresolved: [own, usual],
+        unresolved,
         lever,
     }
 }

@@ -2,21 +2,17 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::Strengths;
 use super::moves::{Move, MoveCovariance, MoveModel, MoveNoise, N_MOVE};
 use super::response::Response;
 
 /// Covariance of a move's residuals with gravity and velocity widened, each by its own factor; their covariance stays as
 /// noise makes it. If it were widened too, a velocity without weight would determine parameters of the gyro through the
 /// correlation. A factor below one is of the motion faster than the samples alone: other noise is measured.
-pub(super) fn widened(response: &Response, strengths: &Strengths) -> MoveCovariance {
-    let excess = strengths.excess;
+pub(super) fn widened(response: &Response, excess: [f64; 2]) -> MoveCovariance {
     let less = excess.map(|factor| factor.min(1.0));
     let of_row = |row: usize| less[usize::from(row > 1)];
     let scaled = MoveCovariance::from_fn(|i, j| of_row(i) * of_row(j));
-    let [own, usual] = &response.unresolved;
-    let unresolved = own * strengths.own + usual * (1.0 - strengths.own);
-    let mut out = response.covariance + unresolved.component_mul(&scaled);
+    let mut out = response.covariance + response.unresolved.component_mul(&scaled);
     let more = excess.map(|factor| factor.max(1.0).powi(2));
     let mut gravity = out.fixed_view_mut::<2, 2>(0, 0);
     gravity *= more[0];
@@ -40,7 +36,7 @@ fn add_square<const N: usize>(
     }
 }
 
-/// Covariance by noise that is measured, and by motion faster than the samples, the move's own and the usual one. What has no known direction has equal
+/// Covariance by noise that is measured, and by motion faster than the samples. What has no known direction has equal
 /// variance on all axes.
 pub(super) fn of_samples(
     one: &Move,
@@ -48,7 +44,7 @@ pub(super) fn of_samples(
     noise: &MoveNoise,
     by_rate: &[SMatrix<f64, N_MOVE, 3>],
     by_force: &[Matrix3<f64>],
-) -> [MoveCovariance; 3] {
+) -> [MoveCovariance; 2] {
     let even = |scale: &Matrix3<f64>, variance: &Vector3<f64>| {
         let mean = (scale.component_mul(scale) * variance).mean();
         Matrix3::identity() * (mean / (one.duration_s * one.step_s))
@@ -78,10 +74,6 @@ pub(super) fn of_samples(
         passed(
             even(of_rate, &one.unresolved[1]),
             even(of_force, &one.unresolved[0]),
-        ),
-        passed(
-            even(of_rate, &one.unresolved[5]),
-            even(of_force, &one.unresolved[4]),
         ),
     ]
 }

@@ -8,21 +8,18 @@ use super::{N_SCATTER, Strengths};
 
 /// Scatter that counts as none, in units of the session's reference.
 pub const NO_SCATTER: f64 = 1e-3;
-/// First index of each kind of strength: corner times, scatters, departures between poses, excess of moves, the share of
-/// their own motion.
+/// First index of each kind of strength: corner times, scatters, departures between poses, excess of moves.
 const SCATTER_AT: usize = 2;
 const BETWEEN_AT: usize = SCATTER_AT + N_SCATTER;
 const EXCESS_AT: usize = BETWEEN_AT + 2;
-const OWN_AT: usize = EXCESS_AT + 2;
-const N_STRENGTHS: usize = OWN_AT + 1;
+const N_STRENGTHS: usize = EXCESS_AT + 2;
 /// Indices of the scatters of either sensor.
 const SCATTER_OF: [Range<usize>; 2] = [SCATTER_AT..SCATTER_AT + 1, SCATTER_AT + 1..BETWEEN_AT];
 /// Strengths that are changed together, in this order. Excess of moves comes first: a bias scatter that explains one
 /// bad move would absorb the poses. The axes of a gyro scatter alike more often than not.
 const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
     EXCESS_AT..EXCESS_AT + 1,
-    EXCESS_AT + 1..OWN_AT,
-    OWN_AT..N_STRENGTHS,
+    EXCESS_AT + 1..N_STRENGTHS,
     0..1,
     1..2,
     SCATTER_AT..SCATTER_AT + 1,
@@ -43,10 +40,6 @@ const SCATTER: (f64, f64) = (-6.9, 9.2);
 /// by √2/2 (0.7), a third bias by √(3/2): no departure is larger.
 const BETWEEN: (f64, f64) = (-3.0, 0.2);
 const EXCESS: (f64, f64) = (-4.6, 9.2);
-/// A share of a hundredth is none; what is extrapolated from one move is no better than from all of them.
-const OWN: (f64, f64) = (-4.6, -std::f64::consts::LN_2);
-/// Part of the noise of moves that motion faster than the samples must have for a share of it to matter.
-const ROUGH: f64 = 0.1;
 /// Standard deviation of the logarithm of an excess: the motion faster than the samples is extrapolated, to a factor of
 /// three.
 pub(super) const EXTRAPOLATED: f64 = 1.1;
@@ -99,7 +92,6 @@ impl Within {
             SCATTER_AT => below(self.scatter[0], SCATTER),
             _ if i < BETWEEN_AT => below(self.scatter[1], SCATTER),
             _ if i < EXCESS_AT => BETWEEN,
-            OWN_AT => OWN,
             _ => below(self.excess[i - EXCESS_AT], EXCESS),
         })
     }
@@ -121,8 +113,7 @@ impl<'a> Search<'a> {
         x[..SCATTER_AT].copy_from_slice(&start.corner_s);
         x[SCATTER_AT..BETWEEN_AT].copy_from_slice(&start.scatter);
         x[BETWEEN_AT..EXCESS_AT].copy_from_slice(&start.between);
-        x[EXCESS_AT..OWN_AT].copy_from_slice(&start.excess);
-        x[OWN_AT] = start.own;
+        x[EXCESS_AT..].copy_from_slice(&start.excess);
         let mut x = x.map(f64::ln);
         let bounds = within.bounds();
         for (value, (low, high)) in x.iter_mut().zip(bounds) {
@@ -163,7 +154,7 @@ impl<'a> Search<'a> {
         let Some((_, weighted_rows)) = &self.weighted_rows else {
             return f64::NEG_INFINITY;
         };
-        let away = x[EXCESS_AT..OWN_AT].iter().map(|e| e.powi(2));
+        let away = x[EXCESS_AT..].iter().map(|e| e.powi(2));
         self.hypothesis.beside(&strengths, weighted_rows)
             - 0.5 * away.sum::<f64>() / EXTRAPOLATED.powi(2)
     }
@@ -177,10 +168,6 @@ impl<'a> Search<'a> {
                 let mut scatters = self.x[SCATTER_OF[i - BETWEEN_AT].clone()].iter();
                 has_moves && scatters.any(|x| *x > LEAST_SCATTER.ln())
             }
-            OWN_AT => h
-                .moves
-                .iter()
-                .any(|open| open.passed.response.is_rough(ROUGH)),
             _ => has_moves && self.bounds[i].0 < self.bounds[i].1 && self.x[i] < NO_WEIGHT,
         }
     }
@@ -317,6 +304,5 @@ fn strengths_of(x: &Point) -> Strengths {
         scatter: std::array::from_fn(|i| e[SCATTER_AT + i].max(NO_SCATTER)),
         between: pair(BETWEEN_AT),
         excess: pair(EXCESS_AT),
-        own: e[OWN_AT],
     }
 }

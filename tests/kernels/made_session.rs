@@ -66,7 +66,7 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
             force.push(inverse_force * (here - force_bias) + offset);
         }
         up.push(exp(&(-axis * 1.8)) * up[m]);
-        let (ends, unresolved) = ([pose_time[m], pose_time[m + 1]], [Vector3::zeros(); 6]);
+        let (ends, unresolved) = ([pose_time[m], pose_time[m + 1]], [Vector3::zeros(); 4]);
         moves.push(Move::new(
             m,
             &time,

@@ -22,7 +22,6 @@ const STRENGTHS: Strengths = Strengths {
     scatter: [1.0; 4],
     between: [0.6, 0.6],
     excess: [1.0, 1.0],
-    own: 0.5,
 };
 
 /// Groups of rows at a state, the moves with the weights that another one gives them.

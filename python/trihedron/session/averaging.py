@@ -50,8 +50,7 @@ def unresolved_variance(
     quantum: FloatArray,
     time_s: FloatArray | None = None,
 ) -> FloatArray:
-    """(moves, 2, 3) variance, (raw unit · s)², of every move's integral by motion above half the sampling frequency: by
-    its own spectrum, and by that of the session's usual move.
+    """(moves, 3) variance, (raw unit · s)², of every move's integral by motion above half the sampling frequency.
 
     Raw ``readings`` (n, 3) of one sensor, half-open sample ranges. The power of the noise is that of the poses, at
     least that of rounding by the LSB ``quantum`` (3,); ``time_s`` (n,) shows gaps.

@@ -22,12 +22,9 @@ LEAST_SHARE = 1e-9
 Along = tuple[FloatArray, FloatArray]
 """Directions (h, 3) and the standard errors (h,) of pose means along them."""
 Pair = tuple[float, float]
-Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair, float]
+Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair]
 """Corner times of walks [s], scatter from pose to pose in its units (accelerometer, gyro by axis), departure in moves
-in units of the scatter, factors on the noise of moves, share of a move's own spectrum in its motion faster than the
-samples. Pairs: accelerometer and gyro; of moves gravity and velocity."""
-OWN_MOTION = 0.5
-"""Share of a move's own spectrum at the start, its largest: one move's motion is not known better than that of all."""
+in units of the scatter, factors on the noise of moves. Pairs: accelerometer and gyro; of moves gravity and velocity."""
 NO_SCATTER = 1e-3
 """Scatter that counts as zero."""
 Bounds = tuple[Pair, Pair, Pair]
@@ -42,7 +39,7 @@ def strengths_of_all(
     corner_s: float, scatter: float = NO_SCATTER, between: float = 1.0, moves: float = 1.0
 ) -> Strengths:
     """The same strengths of both sensors, all axes, gravity and velocity."""
-    return (corner_s, corner_s), (scatter,) * 4, (between, between), (moves, moves), OWN_MOTION
+    return (corner_s, corner_s), (scatter,) * 4, (between, between), (moves, moves)
 
 
 START_STRENGTHS = strengths_of_all(8.0 * NOISE_CORNER_S)
@@ -92,9 +89,8 @@ class SessionNoise:
 def measure_noise(
     recording: Recording, segments: Segments, ranges: list[tuple[int, int]]
 ) -> tuple[SessionNoise, FloatArray]:
-    """Noise of poses, and variance (m, 6, 3) of the integrals of every move, (raw unit · s)², in the half-open sample
-    ``ranges`` of the moves: of force and rate by motion faster than the samples, then by rounding and slow noise, then
-    by the motion faster than the samples that moves usually have.
+    """Noise of poses, and variance (m, 4, 3) of the integrals of every move, (raw unit · s)², in the half-open sample
+    ``ranges`` of the moves: of force and rate by motion faster than the samples, then by rounding and slow noise.
 
     Refused when the segments state no uncertainty of their means.
     """
@@ -116,12 +112,12 @@ def measure_noise(
         densities.append(np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s))
         of_rate = expected_scatter(recording.gyroscope, spans)
     moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
-    variances = np.zeros((len(ranges), 6, 3))
+    variances = np.zeros((len(ranges), 4, 3))
     for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
         if readings is None or not ranges:
             continue
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
-        variances[:, [k, 4 + k]] = unresolved_variance(readings, ranges, spans, step_s, quantum, recording.time_s)
+        variances[:, k] = unresolved_variance(readings, ranges, spans, step_s, quantum, recording.time_s)
         if k == 0:
             # For a gyro rounding is estimated with the angles of moves and the place of its bias.
             variances[:, 2] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2

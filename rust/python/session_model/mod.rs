@@ -32,8 +32,8 @@ type Changes<'py> = (Array2<'py>, Array3<'py>);
 /// A value for the accelerometer and one for the gyro.
 type Pair = (f64, f64);
 /// Corner times s, scatter, departure from the line between poses, excess of moves: accelerometer and gyro (gravity and
-/// velocity) each, scatter of the gyro by axis; and the share of a move's own motion faster than the samples.
-type AllStrengths = (Pair, (f64, f64, f64, f64), Pair, Pair, f64);
+/// velocity) each, scatter of the gyro by axis.
+type AllStrengths = (Pair, (f64, f64, f64, f64), Pair, Pair);
 /// Shortest corner times s, largest scatter, largest excess of moves.
 type Bounds = (Pair, Pair, Pair);
 
@@ -113,7 +113,6 @@ fn strengths_of(given: AllStrengths) -> Strengths {
         scatter: given.1.into(),
         between: given.2.into(),
         excess: given.3.into(),
-        own: given.4,
     }
 }
 
@@ -123,7 +122,6 @@ fn all_strengths(given: &Strengths) -> AllStrengths {
         given.scatter.into(),
         given.between.into(),
         given.excess.into(),
-        given.own,
     )
 }
 

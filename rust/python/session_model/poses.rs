@@ -179,9 +179,9 @@ fn moves_of(
     if m == 0 {
         return Ok(Vec::new());
     }
-    if ranges.shape()[1] != 2 || before.as_array().len() != m || unresolved.shape() != [m, 6, 3] {
+    if ranges.shape()[1] != 2 || before.as_array().len() != m || unresolved.shape() != [m, 4, 3] {
         return Err(PyValueError::new_err(format!(
-            "{m} moves need ranges ({m}, 2), poses ({m},) and unresolved variances ({m}, 6, 3)"
+            "{m} moves need ranges ({m}, 2), poses ({m},) and unresolved variances ({m}, 4, 3)"
         )));
     }
     let Some(rate) = rate else {
@@ -224,7 +224,7 @@ fn moves_of(
                 "move {k} begins in pose {pose} and there is none after it"
             )));
         }
-        let extra = [0, 1, 2, 3, 4, 5].map(|s| Vector3::from_fn(|i, _| unresolved[[k, s, i]]));
+        let extra = [0, 1, 2, 3].map(|s| Vector3::from_fn(|i, _| unresolved[[k, s, i]]));
         out.push(Move::new(
             pose,
             &time_s[start..stop],

@@ -41,7 +41,7 @@ class Observations(SessionReadings):
     of the pose after, so that static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``jitter_s``
     is the scatter of sampling instants about their timestamps, once a diagnosis has found it; ``disturbed_s`` are
     disturbed intervals of poses, s.
-    ``unresolved`` maps a move's two poses to the variance of its integrals, (6, 3) in (raw unit · s)²: of force and
+    ``unresolved`` maps a move's two poses to the variance of its integrals, (4, 3) in (raw unit · s)²: of force and
     rate by motion faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
     ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
     ``half_changes`` (poses, 3): raw mean over the second half of every pose less that over the first, of either sensor.
@@ -153,7 +153,7 @@ class Observations(SessionReadings):
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
-        nothing = np.zeros((6, 3))
+        nothing = np.zeros((4, 3))
         unresolved = [self.unresolved.get((int(a), int(b)), nothing) for a, b in self.move_poses]
         force, rate = (
             None if raw is None else np.ascontiguousarray(sharpened(raw, self.time_s, self.averaging))
@@ -167,7 +167,7 @@ class Observations(SessionReadings):
             rate=rate,
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
-            unresolved=np.array(unresolved).reshape(-1, 6, 3),
+            unresolved=np.array(unresolved).reshape(-1, 4, 3),
             leans=np.zeros((self.n_poses, 2, 3)) if self.support is None else self.support[0].leans,
         )
 
@@ -223,7 +223,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
             [np.zeros((segments.n_poses, 3)), _turned_at_ends(noise.pose_rate_sigma, lasts)], axis=1
         )
     for own, ends in zip(of_moves, poses, strict=True):
-        own[2:4] += swing[list(ends)].sum(axis=0)
+        own[2:] += swing[list(ends)].sum(axis=0)
     spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64).reshape(-1, 2)
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,

@@ -29,17 +29,19 @@ class PossibleLosses:
     """Losses that tilt errors and motion make possible.
 
     ``share`` of the samples that may be lost; ``of_scale`` the part of every rotation that the gyro's scale then lacks;
-    ``widening`` (9, 9) what they add to the covariance of ``S``.
+    ``widening`` (9, 9) what they add to the covariance of ``S``. ``scatter`` is the mean square of the tilt errors over
+    the square of the usual one: errors of unknown cause may be common to the moves in which they are large.
     """
 
     share: float = 0.0
     of_scale: float = 0.0
     widening: FloatArray = field(default_factory=lambda: np.zeros((9, 9)))
+    scatter: float = 1.0
 
     def widened(self, covariance: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
         """Covariance (12, 12) of ``S, b`` with the losses; ``b`` follows ``S``, as the raw bias is known."""
         by_scale = np.concatenate([np.eye(9), np.kron(np.eye(3), np.linalg.solve(S, b))])
-        return np.asarray(covariance + by_scale @ self.widening @ by_scale.T)
+        return np.asarray(covariance * max(self.scatter, 1.0) + by_scale @ self.widening @ by_scale.T)
 
     def findings(self, sigma_scale: float) -> Iterator[Finding]:
         """Finding where the scale may lack more than ``sigma_scale``, its relative standard uncertainty without."""

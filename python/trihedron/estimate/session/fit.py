@@ -15,7 +15,7 @@ from trihedron.quantiles import median
 from trihedron.records.words import words
 from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, SessionState, core_state, misfits, state_of
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, NOISE_DOF, OWN_MOTION, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, NOISE_DOF, START_STRENGTHS, Bounds, Strengths
 
 N_LINEAR = 18
 """Parameters of S and b before those of effects."""
@@ -115,7 +115,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
         observed.gravity_m_s2, S_a, b_a + S_a @ observed.force_origin, S_w, len(observed.effect_sigma)
     )
     # Decisions are made at rough fits.
-    core = _fit(observed, state, (*START_STRENGTHS[:3], (1.0, NO_WEIGHT), OWN_MOTION), ANYTHING, is_rough=True)
+    core = _fit(observed, state, (*START_STRENGTHS[:3], (1.0, NO_WEIGHT)), ANYTHING, is_rough=True)
     steady, likely = observed, {}
     for cause in CAUSES:
         likely[cause] = likely_shapes(observed, core, cause)
@@ -123,8 +123,8 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
         if best.columns is not NOTHING:
             observed = with_columns(observed, core, cause, best.columns)
             core = _again(observed, core, best.strengths, ANYTHING, is_rough=True)
-    corner, scatter, between, (gravity, _), own = core.strengths
-    weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0), own), is_rough=True)
+    corner, scatter, between, (gravity, _) = core.strengths
+    weighted = _again(observed, core, (corner, scatter, between, (gravity, 1.0)), is_rough=True)
     chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in misfits(weighted))
     is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
     chosen = weighted if is_expected else core
@@ -142,7 +142,7 @@ def _shared(solution: SessionSolution, steady: Observed, likely: dict[str, list[
             observed = steady
             for name, (beside, *_) in likely.items():
                 observed = with_columns(observed, core, name, (one if name == cause else beside).columns)
-            other = _solution(observed, _again(observed, core, (*one.strengths[:3], *core.strengths[3:])))
+            other = _solution(observed, _again(observed, core, (*one.strengths[:3], core.strengths[3])))
             away = other.parameters - solution.parameters
             out = out + one.probability * (other.covariance + np.outer(away, away))
     return out

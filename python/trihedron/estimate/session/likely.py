@@ -14,7 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.session.observed import Observed
 from trihedron.session.drift import PER_FORCE, TYPICAL, by_force
 from trihedron.session.model import NOTHING
-from trihedron.session.noise import ANYTHING, OWN_MOTION, START_STRENGTHS, Strengths
+from trihedron.session.noise import ANYTHING, START_STRENGTHS, Strengths
 
 UNLIKELY = 0.02
 """Probability of a cause, in whichever shape, below which it is left out of account."""
@@ -43,12 +43,12 @@ def likely_shapes(observed: Observed, core: _core.SessionFit, cause: str) -> lis
     asked = _shapes(observed, core, cause)
     # Also with noise as parts have it: a strong random walk absorbs a curve that low noise shows. Moves are believed as
     # in the fit, because their normalisation is part of the evidence.
-    strengths = [core.strengths, (*START_STRENGTHS[:3], *core.strengths[3:])]
+    strengths = [core.strengths, (*START_STRENGTHS[:3], core.strengths[3])]
     found = core.candidate_gains(asked, [1.0], strengths)
     choice = float(np.log(len(asked)))
     # Stronger noise helps the fit without it no further: its strengths are already those of largest evidence.
     if len(asked) == 1 and found[0][0][0, 0] > -np.log(NEGLIGIBLE):
-        return [Likely(asked[0], 1.0, (*START_STRENGTHS[:3], (1.0, core.strengths[3][1]), OWN_MOTION))]
+        return [Likely(asked[0], 1.0, (*START_STRENGTHS[:3], (1.0, core.strengths[3][1])))]
     if np.logaddexp.reduce([float(one[0].max()) for one in found]) - choice < np.log(UNLIKELY):
         return [Likely(NOTHING, 1.0, core.strengths)]
     answers = core.evidence([NOTHING, *asked], strengths, ANYTHING)

@@ -21,8 +21,9 @@ from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Near, with_prior
 from trihedron.estimate.session.start import Log, begun, is_enough, lower, near_one_another, scale_matrix
-from trihedron.probability import FALSE_ALARM, chdtri
+from trihedron.probability import FALSE_ALARM, chdtri, fdtrc
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.session.noise import NOISE_DOF
 
 
 def calibrate_moves(
@@ -203,7 +204,19 @@ def _losses(log: Log, found: _Fit) -> PossibleLosses:
         observed = log.observed(measured, ~measured.is_lost, near)
         is_steady = not solution.observed.causes
         solution = refitted(observed, solution) if is_steady else solve_session(observed, *near)
-    return possible_losses(log.recording, log.segments, solution.core)
+    losses = possible_losses(log.recording, log.segments, solution.core)
+    fitted = found.solution
+    if fitted.moves_dof < 1.0 or fdtrc(fitted.moves_dof, NOISE_DOF, fitted.moves_chi2 / fitted.moves_dof) > FALSE_ALARM:
+        return losses
+    return replace(losses, scatter=_mean_square(log, found) / fitted.inflation[0] ** 2)
+
+
+def _mean_square(log: Log, found: _Fit) -> float:
+    """Mean square of the tilt errors over that by noise: beyond the square of the usual one where few are large."""
+    seen, used = found.seen, found.used
+    errors = np.radians(seen.angle_deg[used]) * log.gravity_m_s2
+    by_noise = float(seen.floor2[used].sum()) * max(found.solution.moves_dof, 1.0) / (2.0 * np.count_nonzero(used))
+    return float((errors**2).sum()) / max(by_noise, TINY)
 
 
 # The gyro's scale from gravity: rough, but sufficient to distinguish turns of 90, 180 and 360 degrees.
