@@ -1,5 +1,5 @@
-//! Uncertainty over all ways in which the accelerometer's bias may scatter and walk, and its axes be nonlinear, not only
-//! the most likely one (docs/model-session.md, 11.12b, 11.12c).
+//! Uncertainty over all ways in which biases may scatter and walk, and the accelerometer's axes be nonlinear, not only the
+//! most likely one (docs/model-session.md, 11.12b, 11.12c).
 
 use nalgebra::{Cholesky, DMatrix};
 use rayon::prelude::*;
@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::factor::Factor;
 use super::fit::{Fit, RIDGE};
 use super::hypothesis::Hypothesis;
+use super::possible_rate::rate_tried;
 use super::strength_search::NO_SCATTER;
 use super::{Distortion, Session, Strengths};
 use crate::error::{Error, Result};
@@ -14,9 +15,9 @@ use crate::nonlinearity::{self, Beside, COLLECTED, N_COEFFICIENTS};
 
 /// Scatters that the uncertainty allows for, in units of the reference, together as likely a priori as none, and corner
 /// times of the walk beside them, s; and factors on the most likely value of either.
-const SCATTERS: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
-const CORNERS_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
-const AROUND: [f64; 3] = [0.4, 1.0, 2.5];
+pub(super) const SCATTERS: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
+pub(super) const CORNERS_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
+pub(super) const AROUND: [f64; 3] = [0.4, 1.0, 2.5];
 /// Where flicker inside poses predicts a scatter: prior probability of none, and standard deviation of its logarithm;
 /// one half of the rest lies around it, the other half is as without flicker.
 const NONE_ALL_THE_SAME: f64 = 0.1;
@@ -44,7 +45,7 @@ fn scatters_beforehand(expected: f64) -> Vec<(f64, f64)> {
 
 impl Fit {
     /// Covariance of parameters that are linear in the unknowns by `map` `(unknowns, parameters)`, over possible scatters
-    /// and walks of the accelerometer's bias, and nonlinear axes beside each, weighted by their evidence (11.12b, 11.12c).
+    /// and walks of the biases, and nonlinear axes beside each, weighted by their evidence (11.12b, 11.12c).
     ///
     /// Some twenty lengths of gravity less nine unknowns detect a scatter as large as their noise in half of all sessions
     /// only: an uncertainty from the most likely scatter alone is too small there.
@@ -61,7 +62,18 @@ impl Fit {
         }
         let bends = session.nonlinear_axes(self)?;
         let hypothesis = Hypothesis::of(self, &bends, &[COLLECTED; N_COEFFICIENTS])?;
-        let tried = tried(self, session, &hypothesis);
+        let force = force_tried(self, session, &hypothesis);
+        let rate = rate_tried(&self.strengths, &hypothesis);
+        let both = force.iter().flat_map(|(value, of_force)| {
+            rate.iter().map(move |(beside, of_rate)| {
+                let mut at = *of_force;
+                at.corner_s[1] = of_rate.corner_s[1];
+                at.between[1] = of_rate.between[1];
+                at.scatter[1..].copy_from_slice(&of_rate.scatter[1..]);
+                (value + beside, at)
+            })
+        });
+        let tried: Vec<_> = both.collect();
         let values = tried.iter().map(|(value, _)| *value);
         let best = values.fold(f64::NEG_INFINITY, f64::max);
         let likely = tried
@@ -112,8 +124,8 @@ impl Session {
     }
 }
 
-/// Log-evidence of possible scatters and walks, with all coefficients of nonlinear axes free.
-fn tried(fit: &Fit, session: &Session, hypothesis: &Hypothesis) -> Vec<(f64, Strengths)> {
+/// Log-evidence of possible scatters and walks of the accelerometer's bias, with all coefficients of nonlinear axes free.
+fn force_tried(fit: &Fit, session: &Session, hypothesis: &Hypothesis) -> Vec<(f64, Strengths)> {
     let unlikely = -(SCATTERS.len() as f64).ln();
     let mut scatters = scatters_beforehand(session.expected_scatter);
     if fit.strengths.scatter[0] > SCATTERS[SCATTERS.len() - 1] {
@@ -123,22 +135,21 @@ fn tried(fit: &Fit, session: &Session, hypothesis: &Hypothesis) -> Vec<(f64, Str
     if fit.strengths.corner_s[0] < CORNERS_S[0] {
         corners.extend(AROUND.map(|part| part * fit.strengths.corner_s[0]));
     }
-    let tried: Vec<Vec<(f64, Strengths)>> = scatters
-        .par_iter()
-        .map(|&(scatter, prior)| {
+    let mut out = Vec::new();
+    for (&(scatter, prior), values) in scatters.iter().zip(by_scatter(
+        &fit.strengths,
+        hypothesis,
+        0,
+        &scatters,
+        &corners,
+    )) {
+        for (&corner, value) in corners.iter().zip(values) {
             let mut at = fit.strengths;
-            at.scatter[0] = scatter;
-            let Some(weighted_rows) = hypothesis.weighted_rows(&at) else {
-                return Vec::new();
-            };
-            let each = corners.iter().map(|corner| {
-                at.corner_s[0] = *corner;
-                (hypothesis.beside(&at, &weighted_rows) + prior, at)
-            });
-            each.collect()
-        })
-        .collect();
-    tried.concat()
+            (at.scatter[0], at.corner_s[0]) = (scatter, corner);
+            out.push((value + prior, at));
+        }
+    }
+    out
 }
 
 /// Gain in log-evidence by nonlinear axes of unknown strength in place of free ones, the last unknowns of the border, and

@@ -1,7 +1,7 @@
 //! Results of a fit beyond its optimum: leverage, projections for score tests, fits without some rows, covariance of
 //! both linear models (docs/model-session.md, 11.13-11.16).
 
-use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, SMatrix, Vector3};
 
 use super::chain::{Chain, Layout};
 use super::fit::{Fit, gradient};
@@ -91,25 +91,19 @@ impl Fit {
         let layout = self.layout();
         let mut map = force_map(&self.state, layout, &origins[0], 24);
         let mut bias = Vector3::zeros();
-        let mut beyond = Matrix3::zeros();
-        if let Some(one) = self.session_bias(session) {
+        if session.rate.is_some() {
+            let center = origins[1] + self.state.mean_pose_bias(1);
             let scale = &self.state.rate_scale;
-            let center = origins[1] + one.mean;
             bias = -(scale * center);
-            beyond = scale * Matrix3::from_diagonal(&one.variance) * scale.transpose();
             for i in 0..3 {
                 for j in 0..3 {
                     map[(9 + 3 * i + j, 12 + 3 * i + j)] = 1.0;
                     map[(9 + 3 * i + j, 21 + i)] = -center[j];
-                    for (h, w) in one.weights.iter().enumerate() {
-                        map[(layout.at(h) + 2 + j, 21 + i)] = -scale[(i, j)] * w[j];
-                    }
+                    map_mean_bias(&mut map, layout, (1, j), (21 + i, -scale[(i, j)]));
                 }
             }
         }
-        let mut covariance = self.possible_covariance(session, &map)?;
-        let mut corner = covariance.view_mut((21, 21), (3, 3));
-        corner += beyond;
+        let covariance = self.possible_covariance(session, &map)?;
         let covariance = (&covariance + covariance.transpose()) * 0.5;
         Ok((covariance, bias))
     }
@@ -181,24 +175,40 @@ impl Fit {
 }
 
 /// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns; with one bias for the
-/// session (11.16b).
+/// session (11.16).
 fn force_map(state: &State, layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
     let mut map = DMatrix::zeros(layout.n(), n);
-    let bias = origin + state.mean_pose_force_bias();
-    let share = 1.0 / layout.n_poses as f64;
+    let bias = origin + state.mean_pose_bias(0);
     for (c, &(i, j)) in LOWER.iter().enumerate() {
         map[(c, 3 * i + j)] = 1.0;
         map[(c, 9 + i)] -= bias[j];
-        for h in 0..layout.n_poses {
-            let at = layout.at(h);
-            map[(at + 5 + j, 9 + i)] = -state.force_scale[(i, j)] * share;
-            if layout.pose == N_POSE_SCATTER {
-                map[(at + 11 + j, 9 + i)] = state.force_scale[(i, j)] * share;
-            }
-        }
+        map_mean_bias(
+            &mut map,
+            layout,
+            (0, j),
+            (9 + i, -state.force_scale[(i, j)]),
+        );
     }
     for i in 0..3 {
         map[(6 + i, 9 + i)] = 1.0;
     }
     map
+}
+
+/// Adds `factor` times the mean over the poses of one axis of a sensor's biases, without the parts of single poses, to a
+/// parameter.
+fn map_mean_bias(
+    map: &mut DMatrix<f64>,
+    layout: Layout,
+    (sensor, axis): (usize, usize),
+    (parameter, factor): (usize, f64),
+) {
+    let share = factor / layout.n_poses as f64;
+    let (whole, own) = [(5, 11), (2, 8)][sensor];
+    for h in 0..layout.n_poses {
+        map[(layout.at(h) + whole + axis, parameter)] += share;
+        if layout.pose == N_POSE_SCATTER {
+            map[(layout.at(h) + own + axis, parameter)] -= share;
+        }
+    }
 }

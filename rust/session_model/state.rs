@@ -101,17 +101,18 @@ impl State {
         out
     }
 
-    /// Mean of the accelerometer's raw biases over the poses, without the parts of single poses.
+    /// Mean of the raw biases of the accelerometer (0) or the gyro (1) over the poses, without the parts of single poses.
     #[must_use]
-    pub fn mean_pose_force_bias(&self) -> Vector3<f64> {
-        let all = self.pose_force_bias.iter().zip(&self.own[0]);
-        all.map(|(bias, own)| bias - own).sum::<Vector3<f64>>() / self.pose_force_bias.len() as f64
+    pub fn mean_pose_bias(&self, sensor: usize) -> Vector3<f64> {
+        let bias = [&self.pose_force_bias, &self.pose_rate_bias][sensor];
+        let all = bias.iter().zip(&self.own[sensor]);
+        all.map(|(bias, own)| bias - own).sum::<Vector3<f64>>() / bias.len() as f64
     }
 
-    /// Accelerometer `b`, on centred readings, with one bias for the session (docs/model-session.md, 11.16b).
+    /// Accelerometer `b`, on centred readings, with one bias for the session (docs/model-session.md, 11.16).
     #[must_use]
     pub fn session_force_bias(&self) -> Vector3<f64> {
-        self.force_bias - self.force_scale * self.mean_pose_force_bias()
+        self.force_bias - self.force_scale * self.mean_pose_bias(0)
     }
 
     /// The 18 parameters of the linear models.
