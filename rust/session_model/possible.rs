@@ -136,13 +136,11 @@ fn force_tried(fit: &Fit, session: &Session, hypothesis: &Hypothesis) -> Vec<(f6
         corners.extend(AROUND.map(|part| part * fit.strengths.corner_s[0]));
     }
     let mut out = Vec::new();
-    for (&(scatter, prior), values) in scatters.iter().zip(by_scatter(
-        &fit.strengths,
-        hypothesis,
-        0,
-        &scatters,
-        &corners,
-    )) {
+    for (&(scatter, prior), values) in
+        scatters
+            .iter()
+            .zip(hypothesis.by_scatter(&fit.strengths, 0, &scatters, &corners))
+    {
         for (&corner, value) in corners.iter().zip(values) {
             let mut at = fit.strengths;
             (at.scatter[0], at.corner_s[0]) = (scatter, corner);
