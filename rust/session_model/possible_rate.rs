@@ -51,10 +51,12 @@ fn scatters_beforehand(axes: &[f64]) -> Vec<(f64, f64)> {
     let square = axes.iter().map(|s| s * s).sum::<f64>() / axes.len() as f64;
     let usual = square.sqrt().max(1.0);
     let most = axes.iter().fold(most, |most, s| most.max(3.0 * s));
-    let below = ((usual / least).ln() / STEP) as i32;
-    let above = ((most / usual).ln() / STEP).ceil() as i32;
-    let unlikely = -f64::from(below + above + 1).ln();
-    let some = (-below..=above).map(|step| (usual * (STEP * f64::from(step)).exp(), unlikely));
+    let first = usual * (-STEP * ((usual / least).ln() / STEP).floor()).exp();
+    let some: Vec<f64> = std::iter::successors(Some(first), |s| Some(s * STEP.exp()))
+        .take_while(|s| *s < most)
+        .collect();
+    let unlikely = -(some.len() as f64).ln();
+    let some = some.into_iter().map(|scatter| (scatter, unlikely));
     std::iter::once((NO_SCATTER, 0.0)).chain(some).collect()
 }
 
