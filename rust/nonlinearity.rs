@@ -3,6 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, Vector3};
 
 use crate::error::{Error, Result};
+use crate::order_statistics::median;
 use crate::sensor_model::LOWER;
 
 /// Nonlinearity at 1 g, of |g|: data sheets of consumer accelerometers state 0.1 to 0.5 % of a range of ±2 g or more, of
@@ -37,7 +38,7 @@ pub fn columns(x: &Vector3<f64>) -> SMatrix<f64, 3, N_COEFFICIENTS> {
             u * u.abs() - 15.0 / 16.0 * u,
         ];
         for (shape, of_all) in [0.0, 3.0 / 35.0, 1.0 / 16.0].into_iter().enumerate() {
-            let mut column = out.column_mut(N_SHAPES * shape + axis);
+            let mut column = out.column_mut(3 * shape + axis);
             column.copy_from(&(x * of_all));
             column[axis] += along[shape];
         }
@@ -151,9 +152,7 @@ pub fn norm_fit_covariance(
         up[i].dot(&columns(&up[i]).column(c))
     });
     let residual = DVector::from_column_slice(residual);
-    let mut usual = sigma.to_vec();
-    usual.sort_by(f64::total_cmp);
-    let usual = usual[usual.len() / 2];
+    let usual = median(&mut sigma.to_vec());
     let known = prior.map_or(0.0, |sigma| sigma.powi(-2));
     let mut at_fit = None;
     let mut found = Vec::new();

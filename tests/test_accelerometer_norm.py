@@ -241,7 +241,7 @@ def test_bars_hold_for_scatter_and_for_bending(name, n):
 
 
 def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
-    # Twelve edges: u³ is u/2 and u⁴ is u²/2 in all of them. The scale was then uncertain by 78 %.
+    # Twelve edges: u³ is u/2 and u⁴ is u²/2 in all of them.
     pairs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
     up = np.array([np.insert([a, b], k, 0.0) for k in range(3) for a, b in pairs]) / np.sqrt(2.0)
     residual, _ = linear_fit(up, np.random.default_rng(3).normal(size=12) * 4e-4, np.full(12, 4e-4))

@@ -116,7 +116,7 @@ def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, sol
     weight = solution.core.tails[solution.core.labels[tilts, 1]]
     assert weight @ solution.core.residual[tilts] ** 2 / solution.moves_dof < 1.2
     z = (result.gyroscope.S - lower(truth).S_w) / result.gyroscope.sigma_S
-    # 5.1 and 3.8 before; nine parameters of one session are within 3.5 in all but one of two hundred sessions.
+    # Nine parameters of one session are within 3.5 in all but one of two hundred sessions.
     assert np.abs(z).max() < 3.5
 
 
@@ -130,8 +130,7 @@ def test_samples_whose_loss_the_stamps_show_widen_the_gyro_by_what_they_hide():
         part = calibrate(recorded(f[kept], w[kept], rate, t[kept]), gravity_m_s2=G)
         wider.append(np.median(part.gyroscope.sigma_S / whole.gyroscope.sigma_S))
         scores.append((part.gyroscope.S - lower(truth).S_w) / part.gyroscope.sigma_S)
-    # A cubic through four samples crosses one of a smooth move nearly without error: a rate that might be anywhere
-    # between its neighbours made the bars 1.8 to 2.4 times as wide (1.02 to 1.04 now).
+    # A cubic through four samples crosses a lost one of a smooth move nearly without error.
     assert max(wider) < 1.2
     # 18 numbers of two sessions: rms 1 ± 0.17, each session's nine being weakly correlated.
     assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.4
@@ -147,7 +146,7 @@ def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
         of_S = (result.accelerometer.S - lower(truth).S_f)[low] / result.accelerometer.sigma_S[low]
         scores.append([*of_S, *((result.accelerometer.b - lower(truth).b_f) / result.accelerometer.sigma_b)])
     rms = np.sqrt(np.mean(np.square(scores)))
-    # 27 numbers, correlated within a session: 1 +- 0.3. It was 0.36 to 0.40 over 40 and 60 sessions.
+    # 27 numbers, correlated within a session: 1 +- 0.3.
     assert 0.55 < rms < 1.4
 
 

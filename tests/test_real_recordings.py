@@ -306,6 +306,19 @@ def test_sessions_of_one_unit_differ_by_what_they_state(real_data):
     assert 0.905 < np.mean(np.abs(z) < 1.96) < 0.995
 
 
+def test_two_sessions_of_a_phone_agree(real_data):
+    known = []
+    for name in ("rec_2_All_corners_and_120sec_static", "rec_3_gyro_dynamic"):
+        accel, gyro = (real_data / "phone" / f"{name}__{one}.csv" for one in ("Acceleration", "AngularVelocity"))
+        log = trihedron.read(accelerometer_path=accel, gyroscope_path=gyro)
+        one = trihedron.calibrate(log, gravity_m_s2=9.7974).accelerometer
+        by_scale = jacobian(one.S, one.b)[3:6]
+        known.append((invariants(one.S, one.b).log_scale, by_scale @ one.covariance @ by_scale.T))
+    (a, of_a), (b, of_b) = known
+    # Eleven poses and eighteen in other directions: a nonlinear axis shifts their scales apart.
+    assert (a - b) @ np.linalg.solve(of_a + of_b, a - b) < stats.chi2.isf(0.01, 3)
+
+
 def axes_of(x):
     result = allan(Recording(np.arange(len(x)) / RATE, None, x, RATE, gyroscope_unit="rad/s"))
     return result, [axis.terms[TermName.WHITE] for axis in result.axes]
