@@ -1,9 +1,10 @@
 //! Bindings of the likelihood of noise terms.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::ndarray::ArrayView2;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
-use crate::spectral_likelihood::{self as likelihood, Bins, Statement, Terms};
+use crate::spectral_likelihood::{self as likelihood, Bins, Statement};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<SpectralBins>()?;
@@ -22,11 +23,8 @@ pub(crate) struct SpectralBins {
 #[pyclass(frozen, get_all, module = "trihedron._core")]
 pub(crate) struct SpectralFit {
     strength: Vec<f64>,
-    slope: f64,
-    sigma_slope: f64,
+    columns: Vec<f64>,
     deviance: f64,
-    sigma_log: Vec<f64>,
-    is_converged: bool,
 }
 
 /// Estimates and intervals of the amplitude of every term, of a pair of them, and of the line.
@@ -55,40 +53,36 @@ impl SpectralBins {
         py: Python<'_>,
         count: PyReadonlyArray1<'_, f64>,
         power: PyReadonlyArray1<'_, f64>,
-        line_cross: PyReadonlyArray1<'_, f64>,
-        line_square: PyReadonlyArray1<'_, f64>,
+        cross: PyReadonlyArray2<'_, f64>,
+        square: PyReadonlyArray3<'_, f64>,
         basis: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<Self> {
-        let flat: Vec<f64> = basis.as_array().iter().copied().collect();
+        let rows = |table: ArrayView2<'_, f64>| -> Vec<Vec<f64>> {
+            table.outer_iter().map(|row| row.to_vec()).collect()
+        };
+        let pairs = square.as_array();
         let bins = Bins {
             count: count.as_array().to_vec(),
             power: power.as_array().to_vec(),
-            line_cross: line_cross.as_array().to_vec(),
-            line_square: line_square.as_array().to_vec(),
-            basis: flat
-                .chunks(basis.shape()[1].max(1))
-                .map(<[f64]>::to_vec)
-                .collect(),
+            cross: rows(cross.as_array()),
+            square: pairs.outer_iter().flat_map(|of_one| rows(of_one)).collect(),
+            basis: rows(basis.as_array()),
         };
         super::run(py, || bins.check().map(|()| Self { bins }))
     }
 
-    /// Fit the strengths of the active terms.
-    fn fit(&self, py: Python<'_>, active: Vec<usize>, has_line: bool) -> PyResult<SpectralFit> {
+    /// The most likely strengths of the active terms, the columns integrated out.
+    fn fit(&self, py: Python<'_>, active: Vec<usize>) -> PyResult<SpectralFit> {
         self.know(&active)?;
-        let terms = Terms { active, has_line };
-        let fit = super::run_long(py, || likelihood::fit(&self.bins, &terms))?;
+        let fit = super::run_long(py, || likelihood::fit(&self.bins, &active))?;
         Ok(SpectralFit {
             strength: fit.strength,
-            slope: fit.slope,
-            sigma_slope: fit.sigma_slope,
+            columns: fit.columns,
             deviance: fit.deviance,
-            sigma_log: fit.sigma_log,
-            is_converged: fit.is_converged,
         })
     }
 
-    /// Estimates and intervals of every term with all of them in the model and the line integrated out.
+    /// Estimates and intervals of every term with all of them in the model and the columns integrated out.
     fn invert(
         &self,
         py: Python<'_>,

@@ -1,63 +1,96 @@
-//! The likelihood of the strengths with the line integrated out, and its maximum over non-negative strengths.
+//! The likelihood of the strengths with the columns integrated out, and its maximum over non-negative strengths.
 //!
 //! Minimised is
 //!
-//! `M(p) = Σ n (ln v + (P − 2 s C + s² S)/v) + ln A`, `A = Σ n S/v`, `s = Σ (n C/v)/A`
+//! `M(p) = Σ n (ln v + (P − 2 s'C + s'S s)/v) + ln det A`, `A = Σ n S/v`, `s = A⁻¹ Σ n C/v`
 //!
-//! (a flat prior of the slope; docs/noise.md, eq. 15) by scoring: a step is a quadratic programme with the Fisher
+//! (a flat prior of the coefficients; docs/noise.md, eq. 15) by scoring: a step is a quadratic programme with the Fisher
 //! information, solved exactly on every face of the positive quadrant, and shortened until `M` decreases.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{Bins, first_guess};
+use crate::error::Result;
 
 /// Decrease of the deviance below which a fit has converged.
 const ARRIVED: f64 = 1e-7;
 /// Most steps; a fit from a neighbour takes three, one from a rough guess about ten.
 const MOST_STEPS: usize = 80;
 
-/// A point of the likelihood: strengths of all terms, the deviance there, the line.
+/// A point of the likelihood: strengths of all terms, the deviance there, the columns.
 #[derive(Debug, Clone)]
-pub(super) struct Point {
+pub struct Point {
+    /// Strength of every term, zero for those not in the model.
     pub strength: Vec<f64>,
+    /// `M` there.
     pub deviance: f64,
-    pub slope: f64,
+    /// Most likely coefficients of the columns.
+    pub columns: Vec<f64>,
+    /// Standard error of the first column's, infinite where no bin depends on it.
     pub sigma_slope: f64,
+}
+
+impl Point {
+    /// Coefficient of the line, the first column; zero without one.
+    #[must_use]
+    pub fn slope(&self) -> f64 {
+        self.columns.first().copied().unwrap_or(0.0)
+    }
 }
 
 struct Value {
     v: Vec<f64>,
     deviance: f64,
-    slope: f64,
-    /// Information on the slope, zero where no bin depends on the line.
-    information: f64,
+    /// Coefficients of the columns, and their covariance, zero for a column on which no bin depends.
+    columns: DVector<f64>,
+    covariance: DMatrix<f64>,
 }
 
 fn evaluate(bins: &Bins, strength: &[f64]) -> Value {
+    let q = bins.cross.len();
     let v = bins.expectation(strength);
-    let (mut plain, mut cross, mut square) = (0.0, 0.0, 0.0);
-    for b in 0..v.len() {
-        let weight = bins.count[b] / v[b];
-        plain += bins.count[b] * v[b].ln() + weight * bins.power[b];
-        cross += weight * bins.line_cross[b];
-        square += weight * bins.line_square[b];
-    }
-    if square > 0.0 {
-        let slope = cross / square;
-        Value {
-            v,
-            deviance: plain - cross * slope + square.ln(),
-            slope,
-            information: square,
-        }
-    } else {
-        Value {
-            v,
-            deviance: plain,
-            slope: 0.0,
-            information: 0.0,
+    let weight: Vec<f64> = bins.count.iter().zip(&v).map(|(n, v)| n / v).collect();
+    let along = |values: &[f64]| -> f64 { weight.iter().zip(values).map(|(w, x)| w * x).sum() };
+    let plain: f64 = bins.count.iter().zip(&v).map(|(n, v)| n * v.ln()).sum();
+    let cross = DVector::from_fn(q, |i, _| along(&bins.cross[i]));
+    let square = DMatrix::from_fn(q, q, |i, j| along(&bins.square[i * q + j]));
+    let mut deviance = plain + along(&bins.power);
+    let mut covariance = DMatrix::zeros(q, q);
+    let seen: Vec<usize> = (0..q).filter(|&i| square[(i, i)] > 0.0).collect();
+    if let Some(solver) = square.select_rows(&seen).select_columns(&seen).cholesky() {
+        deviance += 2.0 * solver.l().diagonal().map(f64::ln).sum();
+        let inverse = solver.inverse();
+        for (a, &i) in seen.iter().enumerate() {
+            for (b, &j) in seen.iter().enumerate() {
+                covariance[(i, j)] = inverse[(a, b)];
+            }
         }
     }
+    let columns = &covariance * &cross;
+    deviance -= columns.dot(&cross);
+    Value {
+        v,
+        deviance,
+        columns,
+        covariance,
+    }
+}
+
+/// Power of every bin beside the columns, with the share of the power that these have absorbed.
+fn residual(bins: &Bins, value: &Value) -> Vec<f64> {
+    let q = bins.cross.len();
+    let mut out = bins.power.clone();
+    let mut add = |factor: f64, values: &[f64]| {
+        out.iter_mut().zip(values).for_each(|(r, x)| *r += factor * x);
+    };
+    for i in 0..q {
+        add(-2.0 * value.columns[i], &bins.cross[i]);
+        for j in 0..q {
+            let product = value.columns[i] * value.columns[j] + value.covariance[(i, j)];
+            add(product, &bins.square[i * q + j]);
+        }
+    }
+    out
 }
 
 /// Half the gradient and half the expected second derivative with respect to the strengths of `free`.
@@ -65,17 +98,11 @@ fn derivatives(bins: &Bins, free: &[usize], value: &Value) -> (DVector<f64>, DMa
     let m = free.len();
     let mut gradient = DVector::zeros(m);
     let mut matrix = DMatrix::zeros(m, m);
-    let own = if value.information > 0.0 {
-        value.information.recip()
-    } else {
-        0.0
-    };
+    let residual = residual(bins, value);
     for b in 0..value.v.len() {
         let inverse = value.v[b].recip();
-        // The line has absorbed the share S/A of the power.
-        let residual = bins.residual(b, value.slope) + bins.line_square[b] * own;
         let weight = 0.5 * bins.count[b] * inverse;
-        let pull = weight * (1.0 - residual * inverse);
+        let pull = weight * (1.0 - residual[b] * inverse);
         for i in 0..m {
             let share = bins.basis[free[i]][b];
             gradient[i] += pull * share;
@@ -126,7 +153,7 @@ fn quadratic_programme(matrix: &DMatrix<f64>, pull: &DVector<f64>) -> DVector<f6
 }
 
 /// The most likely strengths of `free`, from `start`; strengths that are not free keep their values.
-pub(super) fn fit(bins: &Bins, free: &[usize], start: &[f64]) -> Point {
+pub(super) fn fit_from(bins: &Bins, free: &[usize], start: &[f64]) -> Point {
     let mut strength = start.to_vec();
     let mut value = evaluate(bins, &strength);
     for _ in 0..MOST_STEPS {
@@ -160,13 +187,20 @@ pub(super) fn fit(bins: &Bins, free: &[usize], start: &[f64]) -> Point {
     Point {
         strength,
         deviance: value.deviance,
-        slope: value.slope,
-        sigma_slope: if value.information > 0.0 {
-            value.information.sqrt().recip()
-        } else {
-            f64::INFINITY
+        sigma_slope: match value.covariance.get((0, 0)) {
+            Some(&variance) if variance > 0.0 => variance.sqrt(),
+            _ => f64::INFINITY,
         },
+        columns: value.columns.as_slice().to_vec(),
     }
+}
+
+/// The most likely strengths of the terms `free`, the others zero.
+///
+/// # Errors
+/// As [`Bins::check`].
+pub fn fit(bins: &Bins, free: &[usize]) -> Result<Point> {
+    bins.check().map(|()| best(bins, free))
 }
 
 /// The most likely strengths of `free` from several starts; strengths that are not free are zero.
@@ -184,9 +218,9 @@ pub(super) fn best(bins: &Bins, free: &[usize]) -> Point {
     }
     starts
         .iter()
-        .map(|start| fit(bins, free, start))
+        .map(|start| fit_from(bins, free, start))
         .min_by(|a, b| a.deviance.total_cmp(&b.deviance))
-        .unwrap_or_else(|| fit(bins, free, &guess(None)))
+        .unwrap_or_else(|| fit_from(bins, free, &guess(None)))
 }
 
 /// Standard error of the strength `k`, the others free: the scale of a search along it.

@@ -5,7 +5,7 @@
 //! median. With absent terms fixed at zero, every interval would be conditional on a choice that the same data made.
 
 use super::Bins;
-use super::marginal::{Point, best, fit, sigma};
+use super::marginal::{Point, best, fit_from, sigma};
 use crate::chi_square::normal_above;
 use crate::error::Result;
 
@@ -90,7 +90,7 @@ pub fn invert(
     // A profile may find a lower deviance than the search from guesses.
     for point in profiles.iter().flatten().map(|(_, point)| point) {
         if point.deviance < top.deviance - 1e-6 {
-            top = fit(bins, &free, &point.strength);
+            top = fit_from(bins, &free, &point.strength);
         }
     }
     for (k, profile) in profiles.iter_mut().enumerate() {
@@ -127,7 +127,7 @@ fn held(bins: &Bins, k: usize, amplitude: f64, near: &Point) -> Point {
     if start.iter().all(|&p| p <= 0.0) {
         return without(bins, k);
     }
-    fit(bins, &rest, &start)
+    fit_from(bins, &rest, &start)
 }
 
 fn without(bins: &Bins, k: usize) -> Point {
@@ -250,7 +250,7 @@ fn line(profile: &Profile, least: f64, outside: f64) -> LineMixture {
             let width = 0.5 * (profile[(i + 1).min(n - 1)].0 - profile[i.saturating_sub(1)].0);
             let point = &profile[i].1;
             let weight = width * (-0.5 * (point.deviance - least)).exp();
-            (weight, point.slope, point.sigma_slope)
+            (weight, point.slope(), point.sigma_slope)
         })
         .filter(|w| w.0 > 0.0 && w.2.is_finite())
         .collect();

@@ -170,14 +170,14 @@ def _deviances(spectrum: Spectrum, grid: FloatArray, rate_hz: float, axes: int) 
     """Deviance of every shape and corner (shapes, corners), and without a filter."""
     frequency, power, _ = spectrum.bins
     weight = spectrum.weights(axes)
-    zero = np.zeros(len(power))
+    cross, square = np.zeros((0, len(power))), np.zeros((0, 0, len(power)))
     share = spectrum.rounding_share
     slow = spectrum.beneath(frequency).T
     terms = list(range(1 + len(slow)))
 
     def deviance(gain: FloatArray) -> float:
         basis = np.vstack([(1.0 - share) * gain + share, slow])
-        return float(_core.SpectralBins(weight, power, zero, zero, basis).fit(terms, False).deviance)
+        return float(_core.SpectralBins(weight, power, cross, square, basis).fit(terms).deviance)
 
     if not np.any(power > 0.0):
         return np.zeros((len(ORDERS) + 1, len(grid))), 0.0

@@ -1,4 +1,4 @@
-"""Noise terms of one axis: spectrum, low-pass filtering, lines, selection, intervals."""
+"""Noise terms of one axis: spectrum, low-pass filtering, lines, model, intervals."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from trihedron.channel_facts.low_pass import RISE
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
-from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, select
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model, model_of
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates
 from trihedron.probability import NORMAL_95
 from trihedron.records import AllanCurve, Finding, FindingCode, GaussMarkov, NoiseAxis, NoiseTerm, SlowPair, TermName
@@ -23,23 +23,20 @@ FALLS = np.linspace(-0.3, 0.6, 37)
 WHITE = 1
 
 
-def straightened(selection: Selection) -> tuple[Selection, float]:
-    """The selection with the spectrum's gain 1/(1 + a f²) fitted, and the relative standard error of N due to it.
+def straightened(model: Model) -> tuple[Model, float]:
+    """The model with the spectrum's gain 1/(1 + a f²) fitted, and the relative standard error of N due to it.
 
     Far below its corner a filter of any order falls as 1/(1 + a f²): a is free, N is the density at frequency zero, and
     its additional error is the spread of N over a, weighted by likelihood.
     """
-    bent = [_bent(selection.spectrum, fall) for fall in FALLS]
-    fits = [one.likelihood().fit(selection.active, selection.has_ramp) for one in bent]
-    deviance = np.array([fit.deviance for fit in fits])
+    bent = [_bent(model.spectrum, fall) for fall in FALLS]
+    deviance = np.array([one.fit.deviance for one in bent])
     weight = np.exp(-0.5 * (deviance - deviance.min()))
     weight /= weight.sum()
     best = int(np.argmin(deviance))
-    white = np.array([fit.strength[WHITE] for fit in fits])
-    if white[best] <= 0.0:
-        return replace(selection, fit=fits[best], spectrum=bent[best]), 0.0
-    relative = np.sqrt(white / white[best]) - 1.0
-    return replace(selection, fit=fits[best], spectrum=bent[best]), math.sqrt(float(weight @ relative**2))
+    white = np.array([one.fit.strength[WHITE] for one in bent])
+    relative = np.sqrt(white / white[best]) - 1.0 if white[best] > 0.0 else np.zeros(len(bent))
+    return replace(model, spectrum=bent[best]), math.sqrt(float(weight @ relative**2))
 
 
 def _bent(spectrum: BinnedSpectrum, fall: float) -> BinnedSpectrum:
@@ -59,11 +56,6 @@ RAMP_TAIL = 0.0025
 """Twice the posterior weight of the opposite sign below which a ramp is present."""
 
 _QUANTISATION, _WHITE, _FLICKER, _WALK = range(len(SYMBOLS))
-
-
-def invert(selection: Selection) -> _core.SpectralInversion:
-    """The inverted likelihood of the selection's spectrum with all terms in it, the ramp integrated out."""
-    return selection.spectrum.likelihood().invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
 
 
 def terms_of(found: _core.SpectralInversion, pair: SlowPair) -> dict[TermName, NoiseTerm]:
@@ -109,18 +101,18 @@ def _ramp(found: _core.SpectralInversion) -> NoiseTerm:
     )
 
 
-def gauss_markov_of(found: _core.SpectralInversion, selection: Selection) -> GaussMarkov | None:
-    """The selected Gauss-Markov process at its most likely correlation time, or ``None``."""
-    if selection.correlation_time_s is None:
+def gauss_markov_of(found: _core.SpectralInversion, model: Model) -> GaussMarkov | None:
+    """The Gauss-Markov process at its most likely correlation time, or ``None``."""
+    if model.correlation_time_s is None:
         return None
     k = len(SYMBOLS)
     return GaussMarkov(
         sigma_process=found.most_likely[k],
-        correlation_time_s=selection.correlation_time_s,
+        correlation_time_s=model.correlation_time_s,
         sigma=found.spread[k],
         lower=found.lower[k],
         upper=found.upper[k],
-        evidence=selection.evidence_gauss_markov,
+        evidence=model.evidence_gauss_markov,
     )
 
 
@@ -147,22 +139,22 @@ def identify_axis(
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
     highest, at_nyquist = white_limit(bands, nyquist, None)
-    selection = select(bands, highest, tolerance=TOLERANCE if highest < nyquist else 0.0)
-    lines, masks = find_lines(bands, selection, 1.0 / blank.rate_hz)
+    model = model_of(bands, highest, tolerance=TOLERANCE if highest < nyquist else 0.0)
+    lines, masks = find_lines(bands, model, 1.0 / blank.rate_hz)
     if lines:
         findings.append(remarks.lines(lines, blank.unit))
         highest, at_nyquist = white_limit(bands, nyquist, masks)
-        selection = select(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
+        model = model_of(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
     if highest < nyquist or math.isnan(at_nyquist):
         findings.append(remarks.coloured(highest, nyquist, at_nyquist))
     bend = 0.0
     if highest < nyquist:
-        selection, bend = straightened(selection)
-    selection, scale, worst = _tempered(selection)
+        model, bend = straightened(model)
+    model, scale, worst = _tempered(model)
     if worst is not None:
         findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=worst[0], frequency_hz=worst[1]))
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
-    found = invert(selection)
+    found = model.spectrum.likelihood.invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
     alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
     pair = SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
     terms = terms_of(found, pair)
@@ -171,10 +163,10 @@ def identify_axis(
     axis = replace(
         blank,
         terms=MappingProxyType(terms),
-        gauss_markov=gauss_markov_of(found, selection),
+        gauss_markov=gauss_markov_of(found, model),
         slow_pair=pair,
         lines=tuple(lines),
-        lowest_hz=float(selection.spectrum.frequency_hz[0]),
+        lowest_hz=float(model.spectrum.frequency_hz[0]),
         highest_hz=float(highest),
         longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
         covariance_scale=scale,
@@ -208,13 +200,13 @@ def stretches_between(n: int, steps: Sequence[Event]) -> list[tuple[int, int]]:
     return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 64]
 
 
-def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, float] | None]:
-    """The selection refitted with less weight on half octaves that the terms do not explain (z² as variance factor).
+def _tempered(model: Model) -> tuple[Model, float, tuple[float, float] | None]:
+    """The model refitted with less weight on half octaves that the terms do not explain (z² as variance factor).
 
     Also the largest factor on a variance, and the worst deviation with its frequency where it exceeds 10 %.
     """
-    spectrum = selection.spectrum
-    ratio = spectrum.without_line(selection.fit.slope) / spectrum.expectation(selection.fit.strength)
+    spectrum = model.spectrum
+    ratio = spectrum.without_columns(spectrum.fit.columns) / spectrum.expectation(spectrum.fit.strength)
     octaves = np.log2(spectrum.frequency_hz / spectrum.frequency_hz[0])
     group = np.unique(np.floor(2.0 * octaves), return_inverse=True)[1]
     n = np.bincount(group, spectrum.count)
@@ -223,14 +215,13 @@ def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, floa
     z = (np.maximum(mean, 0.0) ** (1 / 3) - (1 - 2 / (9 * n))) / np.sqrt(2 / (9 * n))
     bad = np.abs(z) > 4.0
     if not bad.any():
-        return selection, 1.0, None
+        return model, 1.0, None
     factor = np.where(bad, z**2, 1.0)
     spectrum = replace(spectrum, count=spectrum.count / factor[group])
-    fit = spectrum.likelihood().fit(selection.active, selection.has_ramp)
     worst = int(np.argmax(np.where(bad, np.abs(mean - 1.0), 0.0)))
     deviation, frequency_hz = float(mean[worst]) - 1.0, float(np.mean(spectrum.frequency_hz[group == worst]))
     large = (deviation, frequency_hz) if abs(deviation) > 0.1 else None
-    return replace(selection, fit=fit, spectrum=spectrum), float(factor[bad].max()), large
+    return replace(model, spectrum=spectrum), float(factor[bad].max()), large
 
 
 # White noise through a coarse ADC: the measured noise depends on the position of the mean inside the LSB.

@@ -27,8 +27,10 @@ MOST_LOOKS = 8192
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Means (k,) of consecutive blocks, the share that is bridged, and the mean of 1/c - 1/m over the blocks."""
+    """Means (k,) of consecutive blocks from number ``first``, the share that is bridged, and the mean of 1/c - 1/m over
+    the blocks."""
 
+    first: int
     means: FloatArray
     bridged: float
     sampling: float
@@ -79,7 +81,7 @@ def block_means(x: FloatArray, block: int) -> list[Run]:
     n = len(x) // block
     parts = x[: n * block].reshape(n, block)
     if np.isfinite(np.sum(x)):
-        return [Run(parts.mean(axis=1) if block > 1 else np.asarray(x), 0.0, 0.0)]
+        return [Run(0, parts.mean(axis=1) if block > 1 else np.asarray(x), 0.0, 0.0)]
     present = np.isfinite(parts)
     count = present.sum(axis=1)
     means = np.where(present, parts, 0.0).sum(axis=1) / np.maximum(count, 1)
@@ -100,7 +102,7 @@ def block_means(x: FloatArray, block: int) -> list[Run]:
             places = np.flatnonzero(~gone)
             level = np.convolve(np.pad(run[places], 4, mode="edge"), np.full(9, 1.0 / 9.0), mode="valid")
             run[gone] = np.interp(np.flatnonzero(gone), places, level)
-        out.append(Run(run, float(gone.mean()), max(sampling, 0.0)))
+        out.append(Run(a, run, float(gone.mean()), max(sampling, 0.0)))
     return out
 
 

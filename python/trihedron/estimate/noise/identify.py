@@ -27,7 +27,7 @@ from trihedron.estimate.noise.screening import (
     tail_error,
     turn_of_gravity,
 )
-from trihedron.estimate.noise.slow_changes import MOSTLY, share_of_temperature, warm_up, wave
+from trihedron.estimate.noise.slow_changes import MOSTLY, SlowChange, share_of_temperature, slow_changes
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.estimate.noise.two_levels import TwoLevels, two_levels
 from trihedron.ranges import merged
@@ -149,31 +149,30 @@ def identify_noise(
         curve=curve,
         source=source,
         excluded_s=tuple((a / rate_hz, b / rate_hz) for a, b in cuts),
-        breaks_s=tuple(sorted({0.5 * (e.start + e.stop) / rate_hz for one in seen for e in one.steps})),
+        breaks_s=tuple(sorted({e.middle / rate_hz for one in seen for e in one.steps})),
         findings=tuple(findings),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Undisturbed:
-    """One channel with excluded intervals as NaN, its own automatic ``cuts``, the ``steps`` of its level, findings, and
-    whether events that its means show are its warm-up."""
+    """One channel with excluded intervals as NaN, its own automatic ``cuts``, the ``steps`` of its level, findings."""
 
     column: FloatArray
     cuts: list[tuple[int, int]]
     steps: list[Event]
     findings: list[Finding]
-    is_warming: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class _Screened:
-    """One channel with excluded intervals as NaN, the ``steps`` of its level, and the share of its slow changes that
-    the temperature explains."""
+    """One channel with excluded intervals as NaN, the ``steps`` of its level, its slow ``changes``, and the share of
+    these that the temperature explains."""
 
     column: FloatArray
     blank: NoiseAxis
     steps: list[Event]
+    changes: list[SlowChange]
     share_of_heat: float
 
     @property
@@ -197,7 +196,7 @@ def _leave_out(column: FloatArray, stretches: Sequence[tuple[int, int]]) -> None
 
 def _without_events(column: FloatArray, rate_hz: float, unit: str) -> _Undisturbed:
     """A channel's impacts and intervals of vibration, to be excluded, and its steps."""
-    steps, impacts, is_warming = sudden_changes(column, rate_hz)
+    steps, impacts = sudden_changes(column, rate_hz)
     calm = column.copy() if impacts else column
     _leave_out(calm, [(impact.start, impact.stop) for impact in impacts])
     shocks = shaken(calm, rate_hz)
@@ -210,20 +209,19 @@ def _without_events(column: FloatArray, rate_hz: float, unit: str) -> _Undisturb
         # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
         findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
         steps, cuts = [], []
-    return _Undisturbed(column, cuts, steps, findings, is_warming)
+    return _Undisturbed(column, cuts, steps, findings)
 
 
-def sudden_changes(column: FloatArray, rate_hz: float) -> tuple[list[Event], list[Event], bool]:
-    """Steps and impacts of a channel, beside its warm-up where that explains some of them: what a bias does in its
+def sudden_changes(column: FloatArray, rate_hz: float) -> tuple[list[Event], list[Event]]:
+    """Steps and impacts of a channel, beside its slow changes where these explain some of them: what a bias does in its
     first minutes is far outside the spread of its later changes."""
     whole = bridged(column)
-    steps, impacts = steps_and_impacts(whole)
-    warm = warm_up(column, rate_hz) if steps or impacts else None
-    if warm is not None:
-        beside = steps_and_impacts(whole - warm.at(np.arange(len(column)) / rate_hz))
-        if (len(beside[0]), len(beside[1])) < (len(steps), len(impacts)):
-            return *beside, True
-    return steps, impacts, False
+    events = steps_and_impacts(whole)
+    changes = slow_changes(column, rate_hz) if any(events) else []
+    if changes:
+        beside = steps_and_impacts(whole - total_of(changes, len(column), rate_hz))
+        events = min(events, beside, key=lambda found: tuple(map(len, found)))
+    return events
 
 
 def _screen(
@@ -232,34 +230,30 @@ def _screen(
     """A channel, ``named`` by its name and unit, beside the logged temperature (n,)."""
     name, unit = named
     column, steps, findings = quiet.column, quiet.steps, quiet.findings
-    breaks = [0.5 * (e.start + e.stop) for e in steps]
-    share = 0.0 if heat is None else share_of_temperature(column, heat, breaks)
-    if automatic and (not steps or quiet.is_warming) and share <= MOSTLY:
-        findings += without_slow_changes(column, rate_hz, unit, heat, has_steps=bool(steps))
+    share = 0.0 if heat is None else share_of_temperature(column, heat, [e.middle for e in steps])
+    changes: list[SlowChange] = []
+    if automatic and share <= MOSTLY:
+        changes, said = without_slow_changes(column, rate_hz, steps, unit, heat)
+        findings += said
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))
     mean = float(np.sum(column, where=present)) / max(n, 1)
     blank = blank_axis(name, unit, rate_hz, n, mean, readout(column))
-    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), steps, share)
+    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), steps, changes, share)
 
 
 def without_slow_changes(
-    column: FloatArray, rate_hz: float, unit: str, heat: FloatArray | None, *, has_steps: bool
-) -> list[Finding]:
-    """Findings for a warm-up and a wave, which are subtracted from the ``column`` (n,) in place; steps hide a wave."""
-    time_s, findings = np.arange(len(column)) / rate_hz, []
-    warm = warm_up(column, rate_hz)
-    if warm is not None:
-        range_degc = remarks.UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))
-        findings.append(remarks.warm_up(abs(warm.size), warm.time_s, unit, range_degc))
-        column -= warm.at(time_s)
-    slow = None if has_steps else wave(column, rate_hz)
-    if slow is not None:
-        findings.append(
-            Finding.of(FindingCode.LOG_DRIFT, "wave", period_s=slow.period_s, amplitude=slow.amplitude, unit=unit)
-        )
-        column -= slow.at(time_s)
-    return findings
+    column: FloatArray, rate_hz: float, steps: Sequence[Event], unit: str, heat: FloatArray | None
+) -> tuple[list[SlowChange], list[Finding]]:
+    """Slow changes of the ``column`` (n,), from which the certain ones are subtracted in place, and their findings."""
+    changes = slow_changes(column, rate_hz, [e.middle for e in steps])
+    column -= total_of(changes, len(column), rate_hz)
+    return changes, list(remarks.changes(changes, unit, heat))
+
+
+def total_of(changes: Sequence[SlowChange], n: int, rate_hz: float) -> FloatArray:
+    """(n,) sum of those ``changes`` at every reading that are certain."""
+    return sum((change.at(np.arange(n) / rate_hz) for change in changes if change.is_certain), np.zeros(n))
 
 
 def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
@@ -308,7 +302,7 @@ def _switching(seen: Sequence[_Screened], found: Iterable[TwoLevels | None]) -> 
 def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCurve, channel: int) -> NoiseAxis:
     if seen.blank.sample_sigma == 0.0:
         return seen.blank
-    bands = ordinates(seen.column, seen.blank.rate_hz, stretches_between(len(seen.column), seen.steps))
+    bands = ordinates(seen.column, seen.blank.rate_hz, stretches_between(len(seen.column), seen.steps), seen.changes)
     axis = identify_axis(bands, seen.blank, curve, channel, tail_error(seen.column), range_degc)
     # Drift that the temperature explains is stated with it.
     others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from scipy.special import chdtri
 
 from trihedron.arrays import TINY, BoolArray, FloatArray
-from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
-from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model, binned
+from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.probability import RARE_ALARM
 from trihedron.records.noise import SpectralLine
 
@@ -19,25 +19,16 @@ noise terms are idealisations, and a smaller loss of white noise does not change
 MOST_LINES = 24
 
 
-def expected_power(band: Ordinates, selection: Selection, step_s: float) -> FloatArray:
-    """(k,) power of every ordinate of ``band`` by the selected terms."""
-    out = np.asarray(selection.fit.strength[: len(SYMBOLS)]) @ band.basis
-    if selection.correlation_time_s is not None:
-        density = gauss_markov_density(band.frequency_hz, step_s, selection.correlation_time_s)
-        out = out + selection.fit.strength[len(SYMBOLS)] * density
-    return np.asarray(out)
-
-
 def find_lines(
-    bands: Sequence[Ordinates], selection: Selection, step_s: float
+    bands: Sequence[Ordinates], model: Model, step_s: float
 ) -> tuple[list[SpectralLine], list[BoolArray]]:
     """Significant sinusoids above the fitted noise, and masks of the ordinates of each band that they affect."""
     lines: list[tuple[SpectralLine, float, int]] = []
     masks = []
     total = sum(len(band.power) for band in bands)
     for number, band in enumerate(bands):
-        expected = expected_power(band, selection, step_s)
-        power = band.power - 2 * selection.fit.slope * band.cross + (selection.fit.slope * band.line) ** 2
+        expected, slow = model.power(band, step_s), np.asarray(model.spectrum.fit.columns)
+        power = band.power - 2 * slow @ band.cross + (slow @ band.columns) ** 2
         level = smooth_level(band, power / expected) * expected
         ratio = power / level
         limit = float(chdtri(band.count[0], RARE_ALARM / total) / band.count[0])
@@ -137,16 +128,14 @@ def white_limit(
     highest = nyquist_hz
     while True:
         spectrum = binned(bands, highest, masked)
-        fit = spectrum.likelihood().fit(range(len(SYMBOLS)), True)
-        expected = spectrum.expectation(fit.strength)
-        if not _deviates(spectrum, expected, fit.slope, highest) and not _droops(spectrum, highest):
+        if not _deviates(spectrum, highest) and not _droops(spectrum, highest):
             break
         if highest / np.sqrt(2.0) < 16.0 * spectrum.frequency_hz[0] or highest < nyquist_hz / 64:
             return highest, float("nan")
         highest /= np.sqrt(2.0)
     whole = binned(bands, nyquist_hz, masked)
     top = whole.frequency_hz > 0.9 * nyquist_hz
-    ratio = float(np.mean(whole.power[top] / whole.expectation(fit.strength)[top])) if top.any() else float("nan")
+    ratio = float(np.mean(whole.power[top] / whole.expectation(spectrum.fit.strength)[top])) if top.any() else float("nan")
     return highest, ratio
 
 
@@ -155,9 +144,9 @@ def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
     low = spectrum.frequency_hz <= highest_hz / 4.0
     if np.count_nonzero(low) < 8:
         return False
-    below = BinnedSpectrum(*(values[..., low] for values in vars(spectrum).values()))
-    fit = below.likelihood().fit((1, 2, 3), True)
-    ratio = spectrum.without_line(fit.slope) / spectrum.expectation(fit.strength)
+    below = BinnedSpectrum(*(getattr(spectrum, one.name)[..., low] for one in fields(spectrum)))
+    fit = below.likelihood.fit((1, 2, 3))
+    ratio = spectrum.without_columns(fit.columns) / spectrum.expectation(fit.strength)
     # The level below is a median of bins, robust to a resonance there.
     level = float(np.median(ratio[low & (spectrum.frequency_hz > highest_hz / 32.0)]))
     top = spectrum.frequency_hz > highest_hz / 2.0 ** (1 / 3)
@@ -168,10 +157,11 @@ def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
     return mean < 1.0 - max(TOLERANCE, 3.0 * math.sqrt(2.0 / count + 4.0 / below.count.sum()))
 
 
-def _deviates(spectrum: BinnedSpectrum, expected: FloatArray, slope: float, highest_hz: float) -> bool:
+def _deviates(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
+    expected = spectrum.expectation(spectrum.fit.strength)
     upper = spectrum.frequency_hz > highest_hz / 4.0
     key = np.floor(3.0 * np.log2(highest_hz / spectrum.frequency_hz[upper]) + 1e-9).astype(np.int64)
-    count, ratio = spectrum.count[upper], (spectrum.without_line(slope) / expected)[upper]
+    count, ratio = spectrum.count[upper], (spectrum.without_columns(spectrum.fit.columns) / expected)[upper]
     n = np.maximum(np.bincount(key, count), TINY)
     mean = np.bincount(key, count * ratio) / n
     return bool(np.any((n >= 8) & (np.abs(mean - 1.0) > np.maximum(TOLERANCE, 4.5 * np.sqrt(2.0 / n)))))

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from trihedron.records import Finding, FindingCode, NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
+    from trihedron.arrays import FloatArray
     from trihedron.estimate.noise.screening import Event, Readout
+    from trihedron.estimate.noise.slow_changes import SlowChange
 
 NAMED = 4
 """Most spectral lines that a finding lists one by one."""
@@ -76,18 +78,23 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
     )
 
 
-def warm_up(drift: float, time_s: float, unit: str, range_degc: tuple[float, float]) -> Finding:
-    """Finding for a warm-up that was subtracted, beside the range of the temperature, ``UNLOGGED`` without one."""
-    return Finding.of(
-        FindingCode.LOG_DRIFT,
-        "warm-up",
-        drift=drift,
-        time_s=time_s,
-        unit=unit,
-        has_temperature=math.isfinite(range_degc[0]),
-        low_degc=range_degc[0],
-        high_degc=range_degc[1],
-    )
+def changes(found: Sequence[SlowChange], unit: str, heat: FloatArray | None = None) -> Iterator[Finding]:
+    """Findings for the exponentials of a warm-up, beside the logged temperature ``heat``, and for waves."""
+    low_degc, high_degc = UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))
+    for one in (change for change in found if change.is_certain):
+        if one.is_wave:
+            yield Finding.of(FindingCode.LOG_DRIFT, "wave", period_s=one.time_s, amplitude=one.size, unit=unit)
+            continue
+        yield Finding.of(
+            FindingCode.LOG_DRIFT,
+            "warm-up",
+            drift=one.size,
+            time_s=one.time_s,
+            unit=unit,
+            has_temperature=heat is not None,
+            low_degc=low_degc,
+            high_degc=high_degc,
+        )
 
 
 def about_terms(axis: NoiseAxis, range_degc: tuple[float, float] = UNLOGGED) -> Iterator[Finding]:

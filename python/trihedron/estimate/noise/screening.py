@@ -43,6 +43,11 @@ class Event:
     stop: int
     size: float
 
+    @property
+    def middle(self) -> float:
+        """Its middle."""
+        return 0.5 * (self.start + self.stop)
+
 
 def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
     """Steps of the level, and short excursions (impacts), of one channel ``x`` (n,); NaN marks a missing reading.

@@ -25,6 +25,7 @@ from trihedron.estimate.noise.gaps import (
     scattered_loss,
     slow_over_fast,
 )
+from trihedron.estimate.noise.slow_changes import SlowChange
 from trihedron.transforms import cosine_transform
 
 SYMBOLS = ("Q", "N", "B", "K")
@@ -59,9 +60,10 @@ USED_SHARE = 8
 class Ordinates:
     """Squared coefficients of one band, times the step: two-sided densities.
 
-    ``frequency_hz``, ``power``, ``count`` (k,): frequency, mean over segments, number of segments; ``line`` (k,) the
-    coefficient of a line of slope 1/s, ``cross`` (k,) the mean product with it; ``length`` readings or means of
-    ``block`` readings in ``step_s`` steps per transform; ``order`` (k,) the index of the coefficient.
+    ``frequency_hz``, ``power``, ``count`` (k,): frequency, mean over segments, number of segments; ``columns`` (c, k)
+    the coefficients of a line of slope 1/s and of what slow changes may leave, ``cross`` (c, k) the mean products with
+    them; ``length`` readings or means of ``block`` readings in ``step_s`` steps per transform; ``order`` (k,) the index
+    of the coefficient.
     With scattered missing readings ``kept`` is the remaining fraction of the power, and ``sampling`` the factor with
     which the variance of readings inside a mean, or the transform, is added to every ordinate (eq. 16).
     """
@@ -70,7 +72,7 @@ class Ordinates:
     power: FloatArray
     count: FloatArray
     cross: FloatArray
-    line: FloatArray
+    columns: FloatArray
     order: IntArray
     length: int
     step_s: float
@@ -112,8 +114,11 @@ def unit_densities(frequency_hz: FloatArray, order: IntArray, length: int, step_
     )
 
 
-def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]]) -> list[Ordinates]:
-    """Bands of all stretches ``[start, stop)`` of one channel ``x`` (n,); NaN marks a missing reading.
+def ordinates(
+    x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]], changes: Sequence[SlowChange] = ()
+) -> list[Ordinates]:
+    """Bands of all stretches ``[start, stop)`` of one channel ``x`` (n,), with columns for its slow ``changes``; NaN
+    marks a missing reading.
 
     Raises ``InputError`` when no stretch is long enough for a spectrum.
     """
@@ -127,9 +132,10 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
     bands: list[Ordinates] = []
     for start, stop in stretches:
         runs = block_means(x[start:stop], block)
-        bands += [_whole(run, block / rate_hz, block, used) for run in runs if len(run.means) >= 32]
+        step_s, start_s = block / rate_hz, start / rate_hz
+        bands += [_whole(run, step_s, block, (start_s, changes), used) for run in runs if len(run.means) >= 32]
     if block > 1 and used == USED_SHARE:
-        bands += _segments(x, rate_hz, stretches, block)
+        bands += _segments(x, rate_hz, stretches, block, _n_columns(changes))
     if not bands:
         raise InputError(
             f"no stretch of the log is long enough to separate noise terms: the longest has "
@@ -139,34 +145,41 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
 
 
 def ordinates_of_means(
-    means: FloatArray, block: int, rate_hz: float, stretches: Sequence[tuple[int, int]], head: FloatArray
+    log: tuple[FloatArray, float], block: int, stretches: Sequence[tuple[int, int]], head: FloatArray,
+    changes: Sequence[SlowChange],
 ) -> list[Ordinates]:
-    """Bands of a log from means (k,) of ``block`` readings and its first readings ``head`` (n,).
+    """Bands of a ``log`` from means (k,) of ``block`` readings, its rate, and its first readings ``head`` (n,).
 
     ``stretches`` are indices of means.
-    """
+    """  # fmt: skip
+    means, rate_hz = log
     step_s = block / rate_hz
-    bands = [_whole(Run(means[a:b], 0.0, 0.0), step_s, block) for a, b in stretches if b - a >= 32]
+    bands = [_whole(Run(a, means[a:b], 0.0, 0.0), step_s, block, (0.0, changes)) for a, b in stretches if b - a >= 32]
     if block > 1:
-        bands += _segments(head, rate_hz, [(0, len(head))], block)
+        bands += _segments(head, rate_hz, [(0, len(head))], block, _n_columns(changes))
     return bands
 
 
-def _whole(run: Run, step_s: float, block: int, used: int = USED_SHARE) -> Ordinates:
-    means = run.means
+def _whole(
+    run: Run, step_s: float, block: int, slow: tuple[float, Sequence[SlowChange]], used: int = USED_SHARE
+) -> Ordinates:
+    """Band of a run; ``slow``: the start [s] of its stretch, and the changes of the log."""
+    means, (start_s, changes) = run.means, slow
     n = len(means)
     last = n - 1 if block == 1 else n // used
     order = np.arange(1, last + 1)
     coefficient = cosine_transform(means - means.mean())[1 : last + 1]
     # Bridged means contain no white noise: the power is scaled up.
     coefficient /= np.sqrt(1.0 - run.bridged)
-    line = line_coefficients(n, order) * step_s
+    time_s = np.asarray(start_s + (run.first + np.arange(n) + 0.5) * step_s, dtype=np.float64)
+    rest = [cosine_transform(change.columns(time_s))[:, 1 : last + 1] for change in changes]
+    columns = np.vstack([line_coefficients(n, order) * step_s, *rest]) * np.sqrt(step_s)
     return Ordinates(
         frequency_hz=order / (2.0 * n * step_s),
         power=coefficient**2 * step_s,
         count=np.ones(last),
-        cross=coefficient * line * step_s,
-        line=line * np.sqrt(step_s),
+        cross=coefficient * np.sqrt(step_s) * columns,
+        columns=columns,
         order=order,
         length=n,
         step_s=step_s,
@@ -175,7 +188,10 @@ def _whole(run: Run, step_s: float, block: int, used: int = USED_SHARE) -> Ordin
     )
 
 
-def _segments(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]], block: int) -> list[Ordinates]:
+def _segments(
+    x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]], block: int, n_columns: int
+) -> list[Ordinates]:
+    """Band above those of means of ``block`` readings; there slow changes leave nothing in their columns."""
     # The band begins where the used eighth of the block means ends, at ordinate 16 of a segment.
     length = max(SEGMENT, 1 << (128 * block - 1).bit_length())
     total = max((stop - start for start, stop in stretches), default=0)
@@ -194,14 +210,15 @@ def _segments(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
     lowest = length // (USED_SHARE * block) + 1
     order = np.arange(lowest, length)
     coefficient = coefficient[:, lowest:]
-    line = line_coefficients(length, order) * step_s
+    columns = np.zeros((n_columns, len(order)))
+    columns[0] = line_coefficients(length, order) * step_s * np.sqrt(step_s)
     return [
         Ordinates(
             frequency_hz=order / (2.0 * length * step_s),
             power=np.mean(coefficient**2, axis=0) * step_s,
             count=np.full(len(order), float(len(parts))),
-            cross=coefficient.mean(axis=0) * line * step_s,
-            line=line * np.sqrt(step_s),
+            cross=coefficient.mean(axis=0) * np.sqrt(step_s) * columns,
+            columns=columns,
             order=order,
             length=length,
             step_s=step_s,
@@ -210,6 +227,10 @@ def _segments(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
             sampling=float(np.mean(present * (1.0 - present))),
         )
     ]
+
+
+def _n_columns(changes: Sequence[SlowChange]) -> int:
+    return 1 + sum(2 * len(change.weights) for change in changes)
 
 
 def line_coefficients(n: int, order: IntArray) -> FloatArray:

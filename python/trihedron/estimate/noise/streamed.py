@@ -109,10 +109,9 @@ def _axis(stream: _core.AllanStream, channel: int, mean: float, head: FloatArray
     if blank.sample_sigma == 0.0:
         return blank
     means, size = stream.means(channel, -(-n // LONGEST_TRANSFORM))
-    steps, _, is_warming = sudden_changes(means, rate_hz / size)
-    findings = [*remarks.events(steps, [], [], rate_hz / size, unit)]
-    if not steps or is_warming:
-        findings += without_slow_changes(means, rate_hz / size, unit, None, has_steps=bool(steps))
-    blank = replace(blank, findings=(*findings, *blank.findings))
-    bands = ordinates_of_means(means, size, rate_hz, stretches_between(len(means), steps), head)
+    steps, _ = sudden_changes(means, rate_hz / size)
+    changes, said = without_slow_changes(means, rate_hz / size, steps, unit, None)
+    events = remarks.events(steps, [], [], rate_hz / size, unit)
+    blank = replace(blank, findings=(*events, *said, *blank.findings))
+    bands = ordinates_of_means((means, rate_hz), size, stretches_between(len(means), steps), head, changes)
     return identify_axis(bands, blank, curve, channel, tail_error(head))

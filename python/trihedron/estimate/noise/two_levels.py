@@ -4,24 +4,14 @@ A spectrum does not tell it from flicker or a bounded walk; but means of short s
 Gaussian noise have all.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.noise.slow_changes import block_means
 
-MEANS = 256
-"""Number of means of equal length: switches after two of them or more are seen."""
-TIMES = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-"""Correlation times, in means, of the Gaussian processes with the same spectrum; a walk and flicker are tried too."""
-STRENGTHS = np.concatenate([[0.0], np.geomspace(1e-2, 1e4, 25)])
-"""Their variances, in units of the white variance of a mean."""
 EARNED = 20.0
 """Least excess of twice the log-likelihood over the best Gaussian process. By Markov's inequality a likelihood ratio of
 e^10 for levels that are given comes by chance in e^-10 = 5e-5 of logs. With fitted levels, and any number of switches,
@@ -46,17 +36,16 @@ class TwoLevels:
 
 def two_levels(x: FloatArray, rate_hz: float) -> TwoLevels | None:
     """The two levels of readings ``x`` (n,), NaN where missing; ``None`` where Gaussian noise explains them as well."""
-    found = block_means(x, MEANS)
-    if found is None:
+    means = block_means(x)
+    if means is None:
         return None
-    y, t, _ = found
-    y = np.interp((np.arange(MEANS) + 0.5) / MEANS, t, y)
-    scale = float(y.std())
+    scale = float(means.y.std())
     if scale == 0.0:
         return None
-    likelihood, levels, is_high = _switching((y - y.mean()) / scale)
+    y = (means.y - means.y.mean()) / scale
+    likelihood, levels, is_high = _switching(y)
     n_switches = int(np.count_nonzero(np.diff(is_high)))
-    rise = 2.0 * (likelihood - _gaussian((y - y.mean()) / scale))
+    rise = 2.0 * (likelihood - replace(means, y=y).fitted(np.empty((len(y), 0)))[0])
     if n_switches < FEWEST or rise < EARNED:
         return None
     duration_s = len(x) / rate_hz
@@ -91,34 +80,3 @@ def _switching(y: FloatArray) -> tuple[float, FloatArray, BoolArray]:
         leave = np.array([pairs[0, 1] / pairs[0].sum(), pairs[1, 0] / pairs[1].sum()]).clip(1e-3, 0.5)
     return likelihood, levels, weight[:, 1] > 0.5
 
-
-def _gaussian(y: FloatArray) -> float:
-    """Largest log-likelihood of white noise with one other Gaussian process of any strength, the mean free."""
-    dof, best = len(y) - 1, -math.inf
-    for power, across in _processes():
-        variance = 1.0 + STRENGTHS[:, None] * power
-        left = ((across @ y) ** 2 / variance).sum(axis=1)
-        best = max(best, float(np.max(-0.5 * (np.log(variance).sum(axis=1) + dof * (np.log(left / dof) + 1.0)))))
-    return best - 0.5 * dof * math.log(2.0 * math.pi)
-
-
-@cache
-def _processes() -> tuple[tuple[FloatArray, FloatArray], ...]:
-    """Of each process: variances and directions (rows) of its independent parts, orthogonal to the mean."""
-    contrasts = np.linalg.svd(np.ones((1, MEANS)))[2][1:]
-    found = []
-    for covariance in _covariances():
-        power, vectors = np.linalg.eigh(contrasts @ covariance @ contrasts.T)
-        found.append((np.maximum(power, 0.0), vectors.T @ contrasts))
-    return tuple(found)
-
-
-def _covariances() -> Iterator[FloatArray]:
-    index = np.arange(MEANS)
-    yield np.minimum.outer(index, index) + 0.5
-    # 1/f noise by Kasdin's filter: fractional integration of order one half.
-    taps = np.cumprod(np.concatenate([[1.0], (np.arange(1, MEANS) - 0.5) / np.arange(1, MEANS)]))
-    filtered = np.array([np.concatenate([taps[: i + 1][::-1], np.zeros(MEANS - i - 1)]) for i in index])
-    yield filtered @ filtered.T
-    for time in TIMES:
-        yield np.exp(-np.abs(np.subtract.outer(index, index)) / time)

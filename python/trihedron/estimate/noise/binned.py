@@ -1,10 +1,10 @@
-"""Selection of the noise terms of a spectrum: every subset is fitted, and each term has a penalty."""
+"""The spectrum in narrow bins, its most likely noise terms, and a Gauss-Markov process where they do not suffice."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -15,12 +15,8 @@ from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
 from trihedron.records.noise import LEAST_S
 
-EVIDENCE = 8.0
-"""Penalty of a term: the least reduction of the deviance. An absent term reaches it with a probability of 0.25 % (half
-a chi-square with one degree of freedom; the ramp, which has two signs, 0.5 %): four absent terms together 1.5 %."""
-
 EVIDENCE_GAUSS_MARKOV = 16.0
-"""Penalty of a Gauss-Markov process, whose time constant is searched on a grid."""
+"""Least reduction of the deviance by a Gauss-Markov process, whose time constant is searched on a grid: 8 for each."""
 
 TOLERANCE_GAUSS_MARKOV = 0.02
 """Relative uncertainty of a half octave in the search for a Gauss-Markov process."""
@@ -31,7 +27,8 @@ BIN_WIDTH = 1.025
 
 @dataclass(frozen=True, eq=False)
 class BinnedSpectrum:
-    """Ordinates averaged over narrow bins: all (b,), ``basis`` (terms, b)."""
+    """Ordinates averaged over narrow bins: all (b,), ``basis`` (terms, b), ``cross`` (c, b) and ``square`` (c, c, b) of
+    the columns of slow changes, the line first."""
 
     frequency_hz: FloatArray
     count: FloatArray
@@ -51,17 +48,24 @@ class BinnedSpectrum:
         total = np.bincount(key, weights=self.count)
         return replace(self, count=self.count * np.minimum(1.0, 2.0 / tolerance**2 / total[key]))
 
+    @cached_property
     def likelihood(self) -> _core.SpectralBins:
         """The likelihood of these bins."""
         return _core.SpectralBins(self.count, self.power, self.cross, self.square, self.basis)
+
+    @cached_property
+    def fit(self) -> _core.SpectralFit:
+        """The most likely strengths of all terms, the columns integrated out."""
+        return self.likelihood.fit(range(len(self.basis)))
 
     def expectation(self, strength: npt.ArrayLike) -> FloatArray:
         """(b,) expected power for the strengths (squares) of the terms."""
         return np.asarray(np.asarray(strength) @ self.basis)
 
-    def without_line(self, slope: float) -> FloatArray:
-        """(b,) power after subtraction of a ramp of ``slope``."""
-        return self.power - 2.0 * slope * self.cross + slope**2 * self.square
+    def without_columns(self, size: npt.ArrayLike) -> FloatArray:
+        """(b,) power after subtraction of the columns times ``size`` (c,)."""
+        s = np.asarray(size)
+        return np.asarray(self.power - 2.0 * s @ self.cross + np.einsum("i,j,ijb->b", s, s, self.square))
 
 
 def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolArray] | None = None) -> BinnedSpectrum:
@@ -95,58 +99,47 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
         count=total,
         power=averaged(lambda band: band.power),
         cross=averaged(lambda band: band.cross),
-        square=averaged(lambda band: band.line**2),
+        square=averaged(lambda band: band.columns[:, np.newaxis] * band.columns),
         basis=averaged(lambda band: band.basis),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
-    """The chosen model: ``active`` indices of the basis, whether it has a ramp, its fit, its spectrum."""
+class Model:
+    """A spectrum with its terms and, where they do not suffice, a Gauss-Markov process as the last."""
 
-    active: tuple[int, ...]
-    has_ramp: bool
-    fit: _core.SpectralFit
     spectrum: BinnedSpectrum
     correlation_time_s: float | None = None
     evidence_gauss_markov: float = 0.0
 
+    def power(self, band: Ordinates, step_s: float) -> FloatArray:
+        """(k,) expected power of every ordinate of ``band``; readings are ``step_s`` apart."""
+        strength = np.asarray(self.spectrum.fit.strength)
+        out = strength[: len(SYMBOLS)] @ band.basis
+        if self.correlation_time_s is not None:
+            out = out + strength[-1] * gauss_markov_density(band.frequency_hz, step_s, self.correlation_time_s)
+        return np.asarray(out)
 
-def select(
+
+def model_of(
     bands: Sequence[Ordinates],
     highest_hz: float,
     masked: Sequence[BoolArray] | None = None,
     *,
     tolerance: float = 0.0,
-    is_cornered: bool = False,
-) -> Selection:
-    """The subset of {Q, N, B, K, R} of least deviance plus ``EVIDENCE`` per term, and a Gauss-Markov process if needed.
+) -> Model:
+    """The model of the ordinates up to ``highest_hz`` that are not ``masked``.
 
     Raises ``InputError`` when the channel does not change, or no ordinate of the spectrum remains.
     """
     spectrum = binned(bands, highest_hz, masked)
+    cornered = _cornered(bands, spectrum.fit.strength)
+    if any(c.any() for c in cornered):
+        both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
+        spectrum = binned(bands, highest_hz, both)
     if tolerance > 0.0:
         spectrum = spectrum.capped(tolerance)
-    likelihood = spectrum.likelihood()
-    table: dict[tuple[tuple[int, ...], bool], _core.SpectralFit] = {}
-    for size in range(1, len(SYMBOLS) + 1):
-        for active in combinations(range(len(SYMBOLS)), size):
-            for has_ramp in (False, True):
-                table[active, has_ramp] = likelihood.fit(active, has_ramp)
-
-    def price(key: tuple[tuple[int, ...], bool]) -> float:
-        return table[key].deviance + EVIDENCE * (len(key[0]) + key[1])
-
-    best = min(table, key=price)
-    if not is_cornered:
-        cornered = _cornered(bands, table[best].strength)
-        if any(c.any() for c in cornered):
-            both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
-            return select(bands, highest_hz, both, tolerance=tolerance, is_cornered=True)
-    active, has_ramp = best
-    plain = Selection(active, has_ramp, table[best], spectrum)
-    step_s = min(band.step_s / band.block for band in bands)
-    return _with_gauss_markov(step_s, plain) or plain
+    return _with_gauss_markov(min(band.step_s / band.block for band in bands), spectrum)
 
 
 def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[BoolArray]:
@@ -162,50 +155,24 @@ def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[Boo
     return out
 
 
-def _with_gauss_markov(step_s: float, plain: Selection) -> Selection | None:
+def _with_gauss_markov(step_s: float, spectrum: BinnedSpectrum) -> Model:
     # Filters change a spectrum by a few per cent: a process must be significant beyond this tolerance.
-    spectrum = plain.spectrum.capped(TOLERANCE_GAUSS_MARKOV)
-    frequency = spectrum.frequency_hz
-    price_plain = spectrum.likelihood().fit(plain.active, plain.has_ramp).deviance
-    price_plain += EVIDENCE * (len(plain.active) + plain.has_ramp)
+    capped, frequency = spectrum.capped(TOLERANCE_GAUSS_MARKOV), spectrum.frequency_hz
     # With a shorter time constant the process is white in this log, with a longer one a random walk.
     shortest, longest = 1.0 / (2 * np.pi * frequency[-1]), 1.0 / (2 * np.pi * frequency[0])
-    extra = len(SYMBOLS)
-    # The process is added to the selected terms, or replaces B, K or both.
-    models = {(*(k for k in plain.active if k not in drop), extra) for drop in ((), (2,), (3,), (2, 3))}
     if not longest > 64 * shortest:
-        return None
+        return Model(spectrum)
 
-    def best_at(time_s: float) -> tuple[float, tuple[int, ...], bool]:
-        likelihood = spectrum.with_gauss_markov(step_s, time_s).likelihood()
-        found = []
-        for model in models:
-            deviance = likelihood.fit(model, plain.has_ramp).deviance
-            price = deviance + EVIDENCE * (len(model) - 1 + plain.has_ramp) + EVIDENCE_GAUSS_MARKOV
-            found.append((price, model, plain.has_ramp))
-        return min(found)
+    def gain(time_s: float) -> float:
+        return capped.fit.deviance - capped.with_gauss_markov(step_s, time_s).fit.deviance
 
     # A corner in the uppermost three octaves is that of a filter, not of a process of the sensor.
     grid = np.geomspace(8 * shortest, longest / 2, max(4, int(np.log2(longest / shortest)) - 3))
-    coarse = [best_at(time_s)[0] for time_s in grid]
-    place = int(np.argmin(coarse))
-    if coarse[place] > price_plain + EVIDENCE_GAUSS_MARKOV / 2:
-        return None
+    best = max(grid, key=gain)
+    if gain(best) < EVIDENCE_GAUSS_MARKOV / 2:
+        return Model(spectrum)
     step = grid[1] / grid[0]
-    fine = np.geomspace(max(grid[place] / step, grid[0]), grid[place] * step, 17)
-    finer = [best_at(time_s) for time_s in fine]
-    place = int(np.argmin([item[0] for item in finer]))
-    price, model, has_ramp = finer[place]
-    if price > price_plain:
-        return None
-    time_s = float(fine[place])
-    full = plain.spectrum.with_gauss_markov(step_s, time_s)
-    fit = full.likelihood().fit(model, has_ramp)
-    return Selection(
-        active=model,
-        has_ramp=has_ramp,
-        fit=fit,
-        spectrum=full,
-        correlation_time_s=time_s,
-        evidence_gauss_markov=price_plain - price + EVIDENCE_GAUSS_MARKOV,
-    )
+    best = max(np.geomspace(max(best / step, grid[0]), best * step, 17), key=gain)
+    if gain(best) < EVIDENCE_GAUSS_MARKOV:
+        return Model(spectrum)
+    return Model(spectrum.with_gauss_markov(step_s, float(best)), float(best), gain(best))
