@@ -7,11 +7,11 @@ from scipy.stats import chi2
 
 from noise_coverage import in_time
 from trihedron.estimate.noise.allan import allan_deviation
+from trihedron.estimate.noise.binned import binned
 from trihedron.estimate.noise.curve_terms import tabulated
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.identify import identify_noise
-from trihedron.estimate.noise.selection import binned
-from trihedron.estimate.noise.slow_changes import warm_up
+from trihedron.estimate.noise.slow_changes import slow_changes
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.files.noise import noise_figures
 from trihedron.records.finding import FindingCode, Severity
@@ -164,14 +164,14 @@ def test_a_warm_up_hundreds_of_times_the_noise_leaves_no_walk():
     rng = np.random.default_rng(3)
     t = np.arange(36_000) / 10.0
     for time_s in (372.0, 403.0):
-        found = warm_up(rng.normal(size=len(t)) - 100.0 * np.exp(-t / time_s), 10.0)
+        (found,) = slow_changes(rng.normal(size=len(t)) - 100.0 * np.exp(-t / time_s), 10.0)
         assert found.time_s == pytest.approx(time_s, rel=2e-3)
         assert found.size == pytest.approx(100.0, rel=2e-3)
 
 
 def test_a_log_too_short_for_what_its_filter_leaves_is_refused_with_a_length():
     one = np.linspace(0.1, 1.0, 10)
-    band = Ordinates(one, one, one, one, one, np.arange(10), 100, 0.01, 1)
+    band = Ordinates(one, one, one, one[None], one[None], np.arange(10), 100, 0.01, 1)
     with pytest.raises(ValueError, match=r"1 s are too short.* record 20 s or more"):
         binned([band], 0.05)
 

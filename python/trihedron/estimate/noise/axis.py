@@ -11,9 +11,9 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import RISE
 from trihedron.estimate.noise import remarks
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model, model_of
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
-from trihedron.estimate.noise.binned import BinnedSpectrum, Model, model_of
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates
 from trihedron.probability import NORMAL_95
 from trihedron.records import AllanCurve, Finding, FindingCode, GaussMarkov, NoiseAxis, NoiseTerm, SlowPair, TermName
@@ -112,7 +112,7 @@ def gauss_markov_of(found: _core.SpectralInversion, model: Model) -> GaussMarkov
         sigma=found.spread[k],
         lower=found.lower[k],
         upper=found.upper[k],
-        evidence=model.evidence_gauss_markov,
+        evidence=model.evidence,
     )
 
 
@@ -123,7 +123,7 @@ TOLERANCE = 0.02
 
 
 def identify_axis(
-    bands: Sequence[Ordinates],
+    choices: Sequence[Sequence[Ordinates]],
     blank: NoiseAxis,
     curve: AllanCurve,
     channel: int,
@@ -132,9 +132,36 @@ def identify_axis(
 ) -> NoiseAxis:
     """``blank`` with the terms of its spectrum, its lines, and findings.
 
-    ``tails`` is the part of N's relative standard error due to non-Gaussian tails, which a spectrum does not show;
+    ``choices`` are the bands of equally likely slow changes: intervals reach over all of them, a term is named where it
+    is needed beside each, the rest is that of the first. ``tails`` is the part of N's relative standard error due to non-Gaussian tails, which a spectrum does not show;
     ``range_degc`` is that of the logged temperature.
     """
+    usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
+    blank = replace(blank, longest_tau_s=float(usable[-1]) if len(usable) else 0.0)
+    axis, *others = (_of_spectrum(bands, blank, tails) for bands in choices)
+    for other in others:
+        terms = {name: _either(term, other.terms[name]) for name, term in axis.terms.items()}
+        pair = min(axis.slow_pair, other.slow_pair, key=lambda one: one.evidence)
+        axis = replace(axis, terms=MappingProxyType(terms), slow_pair=pair)
+    return replace(axis, findings=(*axis.findings, *remarks.about_terms(axis, range_degc)))
+
+
+def _either(one: NoiseTerm, other: NoiseTerm) -> NoiseTerm:
+    """A term with the interval of both statements, named where both name it."""
+    is_present, upper = one.is_present and other.is_present, max(one.upper, other.upper)
+    return replace(
+        one,
+        is_present=is_present,
+        value=one.value if is_present else 0.0,
+        sigma=max(one.sigma, other.sigma) if is_present else 0.0,
+        lower=min(one.lower, other.lower),
+        upper=upper,
+        limit=upper,
+        evidence=min(one.evidence, other.evidence),
+    )
+
+
+def _of_spectrum(bands: Sequence[Ordinates], blank: NoiseAxis, tails: float) -> NoiseAxis:
     # With scattered losses and slow noise only block means are used: their spectrum ends below Nyquist.
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
@@ -153,14 +180,13 @@ def identify_axis(
     model, scale, worst = _tempered(model)
     if worst is not None:
         findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=worst[0], frequency_hz=worst[1]))
-    usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     found = model.spectrum.likelihood.invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
     alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
     pair = SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
     terms = terms_of(found, pair)
     white, level = terms[TermName.WHITE], level_share(blank.sample_sigma, blank.resolution)
     terms[TermName.WHITE] = widened(white, math.hypot(level, bend, tails) * white.estimate)
-    axis = replace(
+    return replace(
         blank,
         terms=MappingProxyType(terms),
         gauss_markov=gauss_markov_of(found, model),
@@ -168,10 +194,9 @@ def identify_axis(
         lines=tuple(lines),
         lowest_hz=float(model.spectrum.frequency_hz[0]),
         highest_hz=float(highest),
-        longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
         covariance_scale=scale,
+        findings=(*blank.findings, *findings),
     )
-    return replace(axis, findings=(*blank.findings, *findings, *remarks.about_terms(axis, range_degc)))
 
 
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:

@@ -15,8 +15,11 @@ from trihedron.errors import InputError
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
 from trihedron.records.noise import LEAST_S
 
-EVIDENCE_GAUSS_MARKOV = 16.0
-"""Least reduction of the deviance by a Gauss-Markov process, whose time constant is searched on a grid: 8 for each."""
+EVIDENCE = 8.0
+"""Penalty of a parameter in the choice between B, K and a Gauss-Markov process (size and time). An absent term reaches
+it with a probability of 0.25 % (half a chi-square with one degree of freedom)."""
+SLOW_TERMS = (2, 3)
+"""The terms that the process may replace: B and K."""
 
 TOLERANCE_GAUSS_MARKOV = 0.02
 """Relative uncertainty of a half octave in the search for a Gauss-Markov process."""
@@ -106,11 +109,14 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A spectrum with its terms and, where they do not suffice, a Gauss-Markov process as the last."""
+    """A spectrum with its terms and, where they do not suffice, a Gauss-Markov process as the last.
+
+    ``evidence`` is what the process reduces the deviance by beyond the slow terms that it replaces.
+    """
 
     spectrum: BinnedSpectrum
     correlation_time_s: float | None = None
-    evidence_gauss_markov: float = 0.0
+    evidence: float = 0.0
 
     def power(self, band: Ordinates, step_s: float) -> FloatArray:
         """(k,) expected power of every ordinate of ``band``; readings are ``step_s`` apart."""
@@ -163,16 +169,24 @@ def _with_gauss_markov(step_s: float, spectrum: BinnedSpectrum) -> Model:
     if not longest > 64 * shortest:
         return Model(spectrum)
 
+    n_terms = range(len(SYMBOLS))
+    models = [[k for k in n_terms if k not in dropped] for dropped in ((), *((k,) for k in SLOW_TERMS), SLOW_TERMS)]
+
+    def least(likelihood: _core.SpectralBins, process: Sequence[int] = ()) -> float:
+        return min(likelihood.fit([*active, *process]).deviance + EVIDENCE * len(active) for active in models)
+
+    plain = least(capped.likelihood)
+
     def gain(time_s: float) -> float:
-        return capped.fit.deviance - capped.with_gauss_markov(step_s, time_s).fit.deviance
+        return plain - least(capped.with_gauss_markov(step_s, time_s).likelihood, (len(SYMBOLS),))
 
     # A corner in the uppermost three octaves is that of a filter, not of a process of the sensor.
     grid = np.geomspace(8 * shortest, longest / 2, max(4, int(np.log2(longest / shortest)) - 3))
     best = max(grid, key=gain)
-    if gain(best) < EVIDENCE_GAUSS_MARKOV / 2:
+    if gain(best) < EVIDENCE:
         return Model(spectrum)
     step = grid[1] / grid[0]
-    best = max(np.geomspace(max(best / step, grid[0]), best * step, 17), key=gain)
-    if gain(best) < EVIDENCE_GAUSS_MARKOV:
+    best = float(max(np.geomspace(max(best / step, grid[0]), best * step, 17), key=gain))
+    if gain(best) < 2.0 * EVIDENCE:
         return Model(spectrum)
-    return Model(spectrum.with_gauss_markov(step_s, float(best)), float(best), gain(best))
+    return Model(spectrum.with_gauss_markov(step_s, best), best, gain(best))

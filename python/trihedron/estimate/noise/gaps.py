@@ -98,10 +98,12 @@ def block_means(x: FloatArray, block: int) -> list[Run]:
     for a, b in joined:
         run, gone = means[a:b], hole[a:b]
         sampling = float(np.mean(1.0 / count[a:b][~gone])) - 1.0 / block
-        if gone.any():
-            places = np.flatnonzero(~gone)
-            level = np.convolve(np.pad(run[places], 4, mode="edge"), np.full(9, 1.0 / 9.0), mode="valid")
-            run[gone] = np.interp(np.flatnonzero(gone), places, level)
+        known = run.copy()
+        for start, stop in ranges_of(gone):
+            # Between the means of as many on either side: an error of theirs is that of white noise over the hole.
+            reach = max(stop - start, 4)
+            ends = (np.nanmean(side) for side in (known[max(start - reach, 0) : start], known[stop : stop + reach]))
+            run[start:stop] = np.interp(np.arange(start, stop), [start - reach / 2, stop + reach / 2], list(ends))
         out.append(Run(a, run, float(gone.mean()), max(sampling, 0.0)))
     return out
 

@@ -27,7 +27,7 @@ from trihedron.estimate.noise.screening import (
     tail_error,
     turn_of_gravity,
 )
-from trihedron.estimate.noise.slow_changes import MOSTLY, SlowChange, share_of_temperature, slow_changes
+from trihedron.estimate.noise.slow_changes import MOSTLY, SlowChange, choices_of, share_of_temperature, slow_changes
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.estimate.noise.two_levels import TwoLevels, two_levels
 from trihedron.ranges import merged
@@ -302,8 +302,9 @@ def _switching(seen: Sequence[_Screened], found: Iterable[TwoLevels | None]) -> 
 def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCurve, channel: int) -> NoiseAxis:
     if seen.blank.sample_sigma == 0.0:
         return seen.blank
-    bands = ordinates(seen.column, seen.blank.rate_hz, stretches_between(len(seen.column), seen.steps), seen.changes)
-    axis = identify_axis(bands, seen.blank, curve, channel, tail_error(seen.column), range_degc)
+    stretches, rate_hz = stretches_between(len(seen.column), seen.steps), seen.blank.rate_hz
+    choices = [ordinates(seen.column, rate_hz, stretches, changes) for changes in choices_of(seen.changes)]
+    axis = identify_axis(choices, seen.blank, curve, channel, tail_error(seen.column), range_degc)
     # Drift that the temperature explains is stated with it.
     others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)
     return replace(axis, findings=others) if seen.is_heated else axis

@@ -19,9 +19,7 @@ noise terms are idealisations, and a smaller loss of white noise does not change
 MOST_LINES = 24
 
 
-def find_lines(
-    bands: Sequence[Ordinates], model: Model, step_s: float
-) -> tuple[list[SpectralLine], list[BoolArray]]:
+def find_lines(bands: Sequence[Ordinates], model: Model, step_s: float) -> tuple[list[SpectralLine], list[BoolArray]]:
     """Significant sinusoids above the fitted noise, and masks of the ordinates of each band that they affect."""
     lines: list[tuple[SpectralLine, float, int]] = []
     masks = []
@@ -135,8 +133,8 @@ def white_limit(
         highest /= np.sqrt(2.0)
     whole = binned(bands, nyquist_hz, masked)
     top = whole.frequency_hz > 0.9 * nyquist_hz
-    ratio = float(np.mean(whole.power[top] / whole.expectation(spectrum.fit.strength)[top])) if top.any() else float("nan")
-    return highest, ratio
+    expected = whole.expectation(spectrum.fit.strength)
+    return highest, float(np.mean(whole.power[top] / expected[top])) if top.any() else math.nan
 
 
 def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:

@@ -32,7 +32,7 @@ MOST = 4
 """Most changes of one log: sums of more exponentials cannot be told apart."""
 PLAUSIBLE = float(np.log(MEANS))
 """Least rise of twice the log-likelihood per parameter (size and time of an exponential; amplitude, phase and period of
-a wave) of a change that the noise terms allow for: with more it is as likely as none (Schwarz)."""
+a wave) of a change for which intervals allow: with more it is as likely as none (Schwarz)."""
 EARNED = 10.0
 """Least rise per parameter of a change that is stated and subtracted."""
 MOSTLY = 0.5
@@ -121,6 +121,12 @@ def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) ->
     return out
 
 
+def choices_of(changes: Sequence[SlowChange]) -> list[Sequence[SlowChange]]:
+    """The changes that are certain and, where there are others, which are as likely as not, all of them."""
+    certain = [change for change in changes if change.is_certain]
+    return [certain] if len(certain) == len(changes) else [certain, changes]
+
+
 @dataclass(frozen=True, eq=False)
 class Means:
     """Means ``y`` (k,) of those equal parts of ``length`` readings that are ``held`` (n,)."""
@@ -176,14 +182,14 @@ class Means:
     def scanned(self, columns: FloatArray, times: FloatArray, *, is_wave: bool) -> tuple[float, float]:
         """Log-likelihood of the best shape of ``times`` (m,) beside ``columns`` (k, c), in white noise and a random
         walk, and its time."""
-        shapes = np.stack([self.shape(time, is_wave=is_wave) for time in times])
         power, across = gaussian_processes(self.held.tobytes())[0]
+        shapes = across @ np.stack([self.shape(time, is_wave=is_wave) for time in times])
+        rest = across @ np.column_stack([self.y, columns])
         best, dof = (-np.inf, 0.0), len(self.y) - 1
         for strength in STRENGTHS:
             variance = 1.0 + strength * power
-            white = across / np.sqrt(variance)[:, np.newaxis]
-            known, _ = np.linalg.qr(white @ columns)
-            y, X = white @ self.y, white @ shapes
+            sigma = np.sqrt(variance)[:, np.newaxis]
+            y, X, (known, _) = rest[:, 0] / sigma[:, 0], shapes / sigma, np.linalg.qr(rest[:, 1:] / sigma)
             y, X = y - known @ (known.T @ y), X - known @ (known.T @ X)
             along = y @ X
             gain = (along * _solved(X.swapaxes(1, 2) @ X, along)).sum(axis=1)
@@ -207,8 +213,8 @@ class Means:
             return -self.fitted(self.with_shapes(base, list(zip(np.exp(logs), kinds, strict=True))), WALK)[0]
 
         # Steps as those between the times that are tried.
-        start = start.clip(least, most)
-        simplex = np.vstack([start, start + np.diag(np.where(start < most - 0.3, 0.3, -0.3) * np.where(kinds, 0.03, 1))])
+        start, step = start.clip(least, most), np.where(kinds, 0.01, 0.3)
+        simplex = np.vstack([start, start + np.diag(np.where(start + step < most, step, -step))])
         best = minimize(
             misfit,
             start,

@@ -145,7 +145,10 @@ def ordinates(
 
 
 def ordinates_of_means(
-    log: tuple[FloatArray, float], block: int, stretches: Sequence[tuple[int, int]], head: FloatArray,
+    log: tuple[FloatArray, float],
+    block: int,
+    stretches: Sequence[tuple[int, int]],
+    head: FloatArray,
     changes: Sequence[SlowChange],
 ) -> list[Ordinates]:
     """Bands of a ``log`` from means (k,) of ``block`` readings, its rate, and its first readings ``head`` (n,).

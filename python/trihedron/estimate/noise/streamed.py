@@ -21,6 +21,7 @@ from trihedron.estimate.noise.allan import (
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.identify import sudden_changes, without_slow_changes
 from trihedron.estimate.noise.screening import readout, tail_error
+from trihedron.estimate.noise.slow_changes import choices_of
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
 from trihedron.records import AllanCurve, Noise, NoiseAxis
 
@@ -113,5 +114,6 @@ def _axis(stream: _core.AllanStream, channel: int, mean: float, head: FloatArray
     changes, said = without_slow_changes(means, rate_hz / size, steps, unit, None)
     events = remarks.events(steps, [], [], rate_hz / size, unit)
     blank = replace(blank, findings=(*events, *said, *blank.findings))
-    bands = ordinates_of_means((means, rate_hz), size, stretches_between(len(means), steps), head, changes)
-    return identify_axis(bands, blank, curve, channel, tail_error(head))
+    stretches = stretches_between(len(means), steps)
+    choices = [ordinates_of_means((means, rate_hz), size, stretches, head, some) for some in choices_of(changes)]
+    return identify_axis(choices, blank, curve, channel, tail_error(head))

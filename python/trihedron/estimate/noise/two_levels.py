@@ -79,4 +79,3 @@ def _switching(y: FloatArray) -> tuple[float, FloatArray, BoolArray]:
         variance = max(float((weight * (y[:, None] - levels) ** 2).sum()) / n, 1e-12)
         leave = np.array([pairs[0, 1] / pairs[0].sum(), pairs[1, 0] / pairs[1].sum()]).clip(1e-3, 0.5)
     return likelihood, levels, weight[:, 1] > 0.5
-
