@@ -25,6 +25,7 @@ pub(crate) struct SpectralFit {
     strength: Vec<f64>,
     columns: Vec<f64>,
     deviance: f64,
+    log_determinant: f64,
 }
 
 /// Estimates and intervals of the amplitude of every term, of a pair of them, and of the line.
@@ -79,6 +80,7 @@ impl SpectralBins {
             strength: fit.strength,
             columns: fit.columns,
             deviance: fit.deviance,
+            log_determinant: fit.log_determinant,
         })
     }
 

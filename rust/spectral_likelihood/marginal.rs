@@ -24,6 +24,8 @@ pub struct Point {
     pub strength: Vec<f64>,
     /// `M` there.
     pub deviance: f64,
+    /// The part `ln det A` of it, without which models with different columns can be compared.
+    pub log_determinant: f64,
     /// Most likely coefficients of the columns.
     pub columns: Vec<f64>,
     /// Standard error of the first column's, infinite where no bin depends on it.
@@ -41,6 +43,7 @@ impl Point {
 struct Value {
     v: Vec<f64>,
     deviance: f64,
+    log_determinant: f64,
     /// Coefficients of the columns, and their covariance, zero for a column on which no bin depends.
     columns: DVector<f64>,
     covariance: DMatrix<f64>,
@@ -55,10 +58,11 @@ fn evaluate(bins: &Bins, strength: &[f64]) -> Value {
     let cross = DVector::from_fn(q, |i, _| along(&bins.cross[i]));
     let square = DMatrix::from_fn(q, q, |i, j| along(&bins.square[i * q + j]));
     let mut deviance = plain + along(&bins.power);
+    let mut log_determinant = 0.0;
     let mut covariance = DMatrix::zeros(q, q);
     let seen: Vec<usize> = (0..q).filter(|&i| square[(i, i)] > 0.0).collect();
     if let Some(solver) = square.select_rows(&seen).select_columns(&seen).cholesky() {
-        deviance += 2.0 * solver.l().diagonal().map(f64::ln).sum();
+        log_determinant = 2.0 * solver.l().diagonal().map(f64::ln).sum();
         let inverse = solver.inverse();
         for (a, &i) in seen.iter().enumerate() {
             for (b, &j) in seen.iter().enumerate() {
@@ -67,10 +71,11 @@ fn evaluate(bins: &Bins, strength: &[f64]) -> Value {
         }
     }
     let columns = &covariance * &cross;
-    deviance -= columns.dot(&cross);
+    deviance += log_determinant - columns.dot(&cross);
     Value {
         v,
         deviance,
+        log_determinant,
         columns,
         covariance,
     }
@@ -187,6 +192,7 @@ pub(super) fn fit_from(bins: &Bins, free: &[usize], start: &[f64]) -> Point {
     Point {
         strength,
         deviance: value.deviance,
+        log_determinant: value.log_determinant,
         sigma_slope: match value.covariance.get((0, 0)) {
             Some(&variance) if variance > 0.0 => variance.sqrt(),
             _ => f64::INFINITY,

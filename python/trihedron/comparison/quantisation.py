@@ -58,7 +58,7 @@ def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
         return None
     seen = Octaves(octaves)
     rising = np.array([4.0 * axis.rate_hz * _mean_sin2(o.low_hz, o.high_hz, axis.rate_hz) for o in octaves])
-    white, quantisation = seen.best(rising)
+    _, white, quantisation = seen.fitted(rising)
     model = np.maximum(white + quantisation * rising, LEAST_MODEL * seen.density)
     # The misfit of the shape widens the error of its size, beside a free floor.
     weight = 1.0 / (model * seen.sigma) ** 2

@@ -133,8 +133,8 @@ def identify_axis(
     """``blank`` with the terms of its spectrum, its lines, and findings.
 
     ``choices`` are the bands of equally likely slow changes: intervals reach over all of them, a term is named where it
-    is needed beside each, the rest is that of the first. ``tails`` is the part of N's relative standard error due to non-Gaussian tails, which a spectrum does not show;
-    ``range_degc`` is that of the logged temperature.
+    is needed beside each, the rest is that of the first. ``tails`` is the part of N's relative standard error due to
+    non-Gaussian tails, which a spectrum does not show; ``range_degc`` is that of the logged temperature.
     """
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     blank = replace(blank, longest_tau_s=float(usable[-1]) if len(usable) else 0.0)

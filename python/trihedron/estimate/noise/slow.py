@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import nnls
 
+from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.probability import chdtrc, chdtri
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise, Ratio
@@ -274,10 +274,6 @@ BETTER = 6.63
 """Least reduction of χ² against the best slope: 1 % for one degree of freedom."""
 FLOOR = 0.5
 """Least share of the white floor in the uppermost octave: a low-pass filter has a corner too, but no floor above it."""
-SMALLEST = 1e-6
-"""Smallest prediction, relative to the density, whose logarithm is taken."""
-TURNS = 4
-"""Iterations of the weights: from the third on no used digit changes."""
 FEWEST_OCTAVES = 5
 """Fewest octaves that can show a floor, a slope and a plateau."""
 
@@ -291,8 +287,8 @@ def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
     ends = 1.0 / (2.0 * math.pi * highest * BEYOND_OCTAVES), BEYOND_OCTAVES / (2.0 * math.pi * lowest)
     n = math.ceil(math.log2(ends[1] / ends[0]) * TIMES_PER_OCTAVE)
     tau = np.geomspace(*ends, n)
-    misfit = np.array([sum(t.misfit(t.corner(one)) for t in tables) for one in tau])
-    rival = min(sum(t.misfit(t.slope(power)) for t in tables) for power in SLOPES)
+    misfit = np.array([sum(t.fitted(t.corner(one))[0] for t in tables) for one in tau])
+    rival = min(sum(t.fitted(t.slope(power))[0] for t in tables) for power in SLOPES)
     dof = sum(len(t.low) - 2 for t in tables) - 1
     best = int(np.argmin(misfit))
     # Where no corner explains the octaves the interval is widened (Birge ratio).
@@ -300,7 +296,7 @@ def correlation_time(axes: Sequence[PoseNoise]) -> Measured | None:
     inside = np.flatnonzero(misfit < misfit[best] + chdtri(1.0, 0.05) * scale)
     if rival - float(misfit[best]) < BETTER * scale or inside[0] == 0 or inside[-1] == n - 1:
         return None
-    if min(t.best(t.corner(float(tau[best])))[0] / t.density[-1] for t in tables) < FLOOR:
+    if min(t.fitted(t.corner(float(tau[best])))[1] / t.density[-1] for t in tables) < FLOOR:
         return None
     lower, upper = float(tau[inside[0] - 1]), float(tau[inside[-1] + 1])
     return Measured(float(tau[best]), lower, upper, math.log(upper / lower) / 3.92)
@@ -327,20 +323,10 @@ class Octaves:
         p = 1.0 - power
         return np.asarray((self.high**p - self.low**p) / p / (self.high - self.low))
 
-    def misfit(self, shape: FloatArray) -> float:
-        """χ² of the logarithms for the best floor and size of ``shape`` (m,)."""
-        floor, size = self.best(shape)
-        predicted = np.maximum(floor + size * shape, SMALLEST * self.density)
-        away = np.log(self.density / predicted) / self.sigma
-        return float(away @ away)
-
-    def best(self, shape: FloatArray) -> tuple[float, float]:
-        """Floor and size of ``shape``, both non-negative, by least squares of relative errors."""
-        predicted, found = self.density, np.zeros(2)
-        for _ in range(TURNS):
-            weight = 1.0 / (self.sigma * predicted)
-            A = np.column_stack([np.ones_like(shape), shape]) * weight[:, None]
-            y = self.density * weight
-            found, _ = nnls(A, y)
-            predicted = np.maximum(found[0] + found[1] * shape, SMALLEST * self.density)
-        return float(found[0]), float(found[1])
+    def fitted(self, shape: FloatArray) -> tuple[float, float, float]:
+        """Deviance above that of a density in every octave, and the most likely floor and size of ``shape`` (m,)."""
+        m, count = len(shape), 2.0 / self.sigma**2
+        basis = np.vstack([np.ones(m), shape])
+        fit = _core.SpectralBins(count, self.density, np.zeros((0, m)), np.zeros((0, 0, m)), basis).fit((0, 1))
+        floor, size = fit.strength
+        return fit.deviance - float(count @ (np.log(self.density) + 1.0)), floor, size

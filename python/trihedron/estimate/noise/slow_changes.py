@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.arrays import TINY, BoolArray, FloatArray
+from trihedron import _core
+from trihedron.arrays import TINY, FloatArray
+from trihedron.estimate.noise import gaps
+from trihedron.estimate.noise.spectrum import gauss_markov_density, unit_densities
 from trihedron.session.drift import LEAST_SWING_K
+from trihedron.transforms import cosine_transform
 
 MEANS = 256
 """Number of means of equal length in which slow changes are sought."""
 MEANS_OF_HEAT = 64
 """Number of means that are compared with the temperature: their noise is hardly white."""
+SHORTEST = 4
+"""Fewest means between two breaks."""
 HELD = 0.5
 """Least share of them with readings."""
 CORRELATION = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-"""Correlation times, in means, of the Gaussian processes beside white noise; a walk and flicker are tried too."""
-STRENGTHS = np.concatenate([[0.0], np.geomspace(1e-3, 1e4, 29)])
-"""Their variances, in units of the white variance of a mean."""
-WALK = slice(1)
-"""The random walk among the processes."""
+"""Correlation times, in means, of the Gauss-Markov processes that are tried beside white noise, flicker and a walk."""
 TIMES = np.geomspace(0.005, 0.5, 15)
 """Time constants that are tried, in lengths of the log: a slower warm-up is like a straight line or a walk."""
 CYCLES = np.arange(1.5, 16.1, 0.125)
@@ -81,43 +83,35 @@ def _shape(phase: FloatArray, *, is_wave: bool) -> FloatArray:
     return np.exp(-phase)[np.newaxis]
 
 
-def _solved(gram: FloatArray, along: FloatArray) -> FloatArray:
-    """(s, c) solutions of normal equations (s, c, c) with right sides (s, c); two columns may be the same."""
-    place = np.arange(gram.shape[-1])
-    gram[:, place, place] *= 1.0 + 1e-12
-    return np.asarray(np.linalg.solve(gram, along[..., np.newaxis])[..., 0])
-
-
 def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) -> list[SlowChange]:
     """Exponentials and waves in readings ``x`` (n,), NaN where missing, that no Gaussian noise explains as well, beside
     a straight line and a level on each side of the ``breaks`` (numbers of readings).
 
     They are added one by one, each time the one that raises the likelihood most, with all their times fitted anew.
     """
-    means = block_means(x)
+    means = block_means(x, breaks=breaks)
     if means is None:
         return []
-    base = means.line_and_levels(breaks)
     times: list[tuple[float, bool]] = []
-    best, found = means.fitted(base), []
+    best, rises = means.beside(times), []
     while len(times) < MOST:
         tried = []
         for is_wave, grid in ((False, TIMES), (True, 1.0 / CYCLES)):
-            likelihood, time = means.scanned(means.with_shapes(base, times), grid, is_wave=is_wave)
+            deviance, time = min((means.beside([*times, (time, is_wave)], ())[0], time) for time in grid)
             # Beside a change whose time is wrong the next one may show little.
-            if times or 2.0 * (likelihood - best[0]) > PLAUSIBLE:
-                more = means.refined(base, [*times, (time, is_wave)])
-                fit = means.fitted(means.with_shapes(base, more))
-                tried.append((2.0 * (fit[0] - best[0]) / (2 + is_wave), fit, more))
+            if times or best[0] - deviance > PLAUSIBLE:
+                more = means.refined([*times, (float(time), is_wave)])
+                fit = means.beside(more)
+                tried.append(((best[0] - fit[0]) / (2 + is_wave), fit, more))
         rise, fit, more = max(tried, key=lambda one: one[0], default=(0.0, best, times))
         if rise <= PLAUSIBLE:
             break
         best, times = fit, more
-        found.append(rise)
-    duration_s, left, out = means.length / rate_hz, best[1][base.shape[1] :], []
-    for (time, is_wave), rise in zip(times, found, strict=True):
+        rises.append(rise)
+    left, out = best[1][1:], []
+    for (time, is_wave), rise in zip(times, rises, strict=True):
         own, left = left[: 1 + is_wave], left[1 + is_wave :]
-        out.append(SlowChange(time * duration_s, tuple(own.tolist()), rise))
+        out.append(SlowChange(time * len(x) / rate_hz, tuple(own), rise))
     return out
 
 
@@ -129,94 +123,75 @@ def choices_of(changes: Sequence[SlowChange]) -> list[Sequence[SlowChange]]:
 
 @dataclass(frozen=True, eq=False)
 class Means:
-    """Means ``y`` (k,) of those equal parts of ``length`` readings that are ``held`` (n,)."""
+    """Means ``y`` (k,) of ``block`` readings, their times ``t`` (k,) in lengths of the log, and the ``runs`` of them
+    without a hole or a break, of which the share ``bridged`` is."""
 
     y: FloatArray
-    held: BoolArray
-    length: int
+    t: FloatArray
+    block: int
+    runs: tuple[tuple[int, int], ...]
+    bridged: tuple[float, ...]
+
+    def transformed(self, values: FloatArray) -> FloatArray:
+        """(..., m) cosine coefficients of ``values`` (..., k) in every run, without its level."""
+        return np.concatenate([cosine_transform(values[..., a:b])[..., 1:] for a, b in self.runs], axis=-1)
 
     @cached_property
-    def t(self) -> FloatArray:
-        """(k,) their times as fractions of the length."""
-        return (np.flatnonzero(self.held) + 0.5) / len(self.held)
+    def coefficients(self) -> FloatArray:
+        """(m,) those of the means; bridged means contain no white noise."""
+        scale = np.repeat([1.0 / np.sqrt(1.0 - share) for share in self.bridged], [b - a - 1 for a, b in self.runs])
+        return np.asarray(scale * self.transformed(self.y))
+
+    @cached_property
+    def noises(self) -> list[FloatArray]:
+        """Expected squares (terms, m) of N, B and K, alone and with each Gauss-Markov process."""
+        parts = []
+        for a, b in self.runs:
+            order, n = np.arange(1, b - a), b - a
+            frequency = order / (2.0 * n)
+            processes = [gauss_markov_density(frequency, 1.0, time) for time in CORRELATION]
+            parts.append(np.vstack([unit_densities(frequency, order, n, 1.0, self.block)[1:], *processes]))
+        whole = np.concatenate(parts, axis=1)
+        return [whole[:3], *(np.vstack([whole[:3], row]) for row in whole[3:])]
+
+    def likely(self, columns: FloatArray, noise: FloatArray) -> _core.SpectralFit:
+        """The most likely strengths of a ``noise`` (terms, m) beside ``columns`` (c, k)."""
+        c, X = self.coefficients, self.transformed(columns)
+        likelihood = _core.SpectralBins(np.ones(len(c)), c**2, c * X, X[:, np.newaxis] * X, noise)
+        return likelihood.fit(range(len(noise)))
+
+    def beside(
+        self, times: Sequence[tuple[float, bool]], processes: Sequence[float] = CORRELATION
+    ) -> tuple[float, list[float]]:
+        """Deviance beside the most likely noise, and the sizes of a line and of the changes of these ``times``."""
+        columns = np.vstack([self.t, *(self.shape(time, is_wave=is_wave) for time, is_wave in times)])
+        fits = [self.likely(columns, noise) for noise in self.noises[: 1 + len(processes)]]
+        return min((fit.deviance - fit.log_determinant, fit.columns) for fit in fits)
 
     def shape(self, time: float, *, is_wave: bool) -> FloatArray:
-        """(k, 1 or 2) means of an exponential or a wave of ``time`` lengths."""
-        half = 0.5 / (len(self.held) * time)
+        """(1 or 2, k) means of an exponential or a wave of ``time`` lengths."""
+        half = 0.5 / (MEANS * time)
         # The mean of a curve over a part is not its middle.
         mean = np.sinc(2.0 * half) if is_wave else np.sinh(half) / half
-        return mean * _shape(self.t / time, is_wave=is_wave).T
+        return np.asarray(mean * _shape(self.t / time, is_wave=is_wave))
 
-    def with_shapes(self, base: FloatArray, times: Sequence[tuple[float, bool]]) -> FloatArray:
-        """(k, c) the columns ``base`` and those of ``times``."""
-        return np.column_stack([base, *(self.shape(time, is_wave=is_wave) for time, is_wave in times)])
-
-    def line_and_levels(self, breaks: npt.ArrayLike) -> FloatArray:
-        """(k, c) a straight line and the levels after the ``breaks`` (numbers of readings) against the first."""
-        level = np.searchsorted(np.sort(breaks), self.t * self.length)
-        return np.column_stack([self.t, level[:, np.newaxis] == np.unique(level)[1:]])
-
-    def fitted(self, columns: FloatArray, processes: slice = slice(None)) -> tuple[float, FloatArray]:
-        """Log-likelihood beside the most likely noise, the mean free, and the weights of ``columns`` (k, c) there."""
-        best, weights = -np.inf, np.zeros(columns.shape[1])
-        for process in gaussian_processes(self.held.tobytes())[processes]:
-            likelihood, solved = self.beside(columns, process)
-            k = int(np.argmax(likelihood))
-            if likelihood[k] > best:
-                best, weights = float(likelihood[k]), solved[k]
-        return best, weights
-
-    def beside(self, columns: FloatArray, process: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
-        """Log-likelihood (s,) and weights (s, c) of ``columns`` (k, c) beside white noise and each strength of a
-        ``process``, their scale free."""
-        power, across = process
-        y, X, dof = across @ self.y, across @ columns, len(self.y) - 1
-        variance = 1.0 + STRENGTHS[:, np.newaxis] * power
-        weighted = X.T / variance[:, np.newaxis]
-        along = weighted @ y
-        solved = _solved(weighted @ X, along)
-        left = np.maximum((y**2 / variance).sum(axis=1) - (along * solved).sum(axis=1), TINY)
-        deviance = np.log(variance).sum(axis=1) + dof * (np.log(2.0 * np.pi * left / dof) + 1.0)
-        return np.asarray(-0.5 * deviance), np.asarray(solved)
-
-    def scanned(self, columns: FloatArray, times: FloatArray, *, is_wave: bool) -> tuple[float, float]:
-        """Log-likelihood of the best shape of ``times`` (m,) beside ``columns`` (k, c), in white noise and a random
-        walk, and its time."""
-        power, across = gaussian_processes(self.held.tobytes())[0]
-        shapes = across @ np.stack([self.shape(time, is_wave=is_wave) for time in times])
-        rest = across @ np.column_stack([self.y, columns])
-        best, dof = (-np.inf, 0.0), len(self.y) - 1
-        for strength in STRENGTHS:
-            variance = 1.0 + strength * power
-            sigma = np.sqrt(variance)[:, np.newaxis]
-            y, X, (known, _) = rest[:, 0] / sigma[:, 0], shapes / sigma, np.linalg.qr(rest[:, 1:] / sigma)
-            y, X = y - known @ (known.T @ y), X - known @ (known.T @ X)
-            along = y @ X
-            gain = (along * _solved(X.swapaxes(1, 2) @ X, along)).sum(axis=1)
-            k = int(np.argmax(gain))
-            left = max(float(y @ y - gain[k]), TINY)
-            deviance = float(np.log(variance).sum()) + dof * (float(np.log(2.0 * np.pi * left / dof)) + 1.0)
-            best = max(best, (-0.5 * deviance, float(times[k])))
-        return best
-
-    def refined(self, base: FloatArray, times: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
-        """Times of the largest likelihood in white noise and a random walk, near the given ones."""
+    def refined(self, times: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
+        """Times of the least deviance near the given ones, beside N, B and K."""
         # Imported here: commands that read a log start faster.
         from scipy.optimize import Bounds, minimize
 
         kinds = [is_wave for _, is_wave in times]
-        start = np.log([time for time, _ in times])
         least = np.log(np.where(kinds, 1.0 / CYCLES[-1], TIMES[0])) - 0.1
         most = np.log(np.where(kinds, 1.0 / CYCLES[0], TIMES[-1])) + 0.1
-
-        def misfit(logs: FloatArray) -> float:
-            return -self.fitted(self.with_shapes(base, list(zip(np.exp(logs), kinds, strict=True))), WALK)[0]
-
         # Steps as those between the times that are tried.
-        start, step = start.clip(least, most), np.where(kinds, 0.01, 0.3)
+        start, step = np.log([time for time, _ in times]).clip(least, most), np.where(kinds, 0.01, 0.3)
         simplex = np.vstack([start, start + np.diag(np.where(start + step < most, step, -step))])
+
+        def deviance(logs: FloatArray) -> float:
+            return self.beside(list(zip(np.exp(logs).tolist(), kinds, strict=True)), ())[0]
+
         best = minimize(
-            misfit,
+            deviance,
             start,
             method="Nelder-Mead",
             bounds=Bounds(least, most),
@@ -225,59 +200,45 @@ class Means:
         return list(zip(np.exp(best.x).tolist(), kinds, strict=True))
 
 
-@lru_cache(maxsize=8)
-def gaussian_processes(held: bytes) -> tuple[tuple[FloatArray, FloatArray], ...]:
-    """Of a random walk, flicker and Gauss-Markov noise in the means that are ``held``: variances and directions (rows)
-    of independent parts, orthogonal to the mean."""
-    there = np.frombuffer(held, dtype=bool)
-    contrasts = np.linalg.svd(np.ones((1, int(there.sum()))))[2][1:]
-    found = []
-    for covariance in _covariances(len(there)):
-        power, vectors = np.linalg.eigh(contrasts @ covariance[np.ix_(there, there)] @ contrasts.T)
-        found.append((np.maximum(power, 0.0), vectors.T @ contrasts))
-    return tuple(found)
-
-
-def _covariances(n: int) -> Iterator[FloatArray]:
-    index = np.arange(n)
-    yield np.minimum.outer(index, index) + 0.5
-    # 1/f noise by Kasdin's filter: fractional integration of order one half.
-    taps = np.cumprod(np.concatenate([[1.0], (np.arange(1, n) - 0.5) / np.arange(1, n)]))
-    filtered = np.array([np.concatenate([taps[: i + 1][::-1], np.zeros(n - i - 1)]) for i in index])
-    yield filtered @ filtered.T
-    for time in CORRELATION:
-        yield np.exp(-np.abs(np.subtract.outer(index, index)) / time)
-
-
 def share_of_temperature(x: FloatArray, temperature: FloatArray, breaks: Sequence[float] = ()) -> float:
     """Share of the power of slow changes of readings ``x`` (n,) that ``temperature`` (n,) explains, beside a straight
     line and a level on each side of the ``breaks`` (numbers of readings); 0 where the temperature does not change."""
     there = np.flatnonzero(np.isfinite(x))
     inside = slice(there[0], there[-1] + 1) if len(there) else slice(0)
-    means = block_means(x[inside], MEANS_OF_HEAT)
+    means = block_means(x[inside], MEANS_OF_HEAT, [at - inside.start for at in breaks])
     if means is None:
         return 0.0
-    heat = temperature[inside][: means.length].reshape(MEANS_OF_HEAT, -1).mean(axis=1)[means.held]
+    n = len(x[inside])
+    heat = np.interp(means.t * n, np.arange(n) + 0.5, temperature[inside])
     swing = float(np.ptp(heat))
     if swing < LEAST_SWING_K:
         return 0.0
-    u, base = (heat - heat.mean()) / swing, means.line_and_levels(np.asarray(breaks) - inside.start)
-    columns = np.column_stack([base, u, u**2, u**3])
-    walk = gaussian_processes(means.held.tobytes())[0]
-    without, beside = (means.beside(part, walk)[0] for part in (base, columns))
-    # In the covariance that is most likely without it, whose whitened readings have the walk's increments.
-    k = int(np.argmax(without))
-    return 1.0 - float(np.exp(2.0 * (without[k] - beside[k]) / len(means.y)))
+    u, line = (heat - heat.mean()) / swing, means.t[np.newaxis]
+    # In the noise that is most likely without it, whose whitened readings have the walk's increments.
+    sigma = np.sqrt(np.asarray(means.likely(line, means.noises[0]).strength) @ means.noises[0])
+    power = []
+    for columns in (line, np.vstack([line, u, u**2, u**3])):
+        white, y = (means.transformed(columns) / sigma).T, means.coefficients / sigma
+        left = y - white @ np.linalg.lstsq(white, y, rcond=None)[0]
+        power.append(float(left @ left))
+    return 1.0 - power[1] / max(power[0], TINY)
 
 
-def block_means(x: FloatArray, number: int = MEANS) -> Means | None:
-    """Means of ``number`` equal parts of readings ``x`` (n,); ``None`` where half of them have too few readings."""
-    n = len(x) // number
-    if n < 1:
+def block_means(x: FloatArray, number: int = MEANS, breaks: Sequence[float] = ()) -> Means | None:
+    """Means of ``number`` equal parts of readings ``x`` (n,) between the ``breaks``; ``None`` where half of them have
+    too few readings, or none differs."""
+    block = len(x) // number
+    if block < 1:
         return None
-    blocks = x[: n * number].reshape(number, n)
-    count = np.isfinite(blocks).sum(axis=1)
-    held = 2 * count >= n
-    if np.count_nonzero(held) < HELD * number:
+    found = []
+    for start, stop in pairwise([0, *(round(at) for at in sorted(breaks)), len(x)]):
+        runs = gaps.block_means(x[start:stop], block)
+        found += [(start / block + run.first, run) for run in runs if len(run.means) >= SHORTEST]
+    ends = np.cumsum([0, *(len(run.means) for _, run in found)]).tolist()
+    if ends[-1] < HELD * number:
         return None
-    return Means(np.nansum(blocks[held], axis=1) / count[held], held, n * number)
+    y, bridged = np.concatenate([run.means for _, run in found]), tuple(run.bridged for _, run in found)
+    if not np.ptp(y) > 0.0:
+        return None
+    t = [(first + np.arange(len(run.means)) + 0.5) * block / len(x) for first, run in found]
+    return Means(y, np.concatenate(t), block, tuple(pairwise(ends)), bridged)

@@ -6,10 +6,13 @@ the others nearly so. A long stretch has two bands: block means of its whole len
 the readings for high ones.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,8 +28,10 @@ from trihedron.estimate.noise.gaps import (
     scattered_loss,
     slow_over_fast,
 )
-from trihedron.estimate.noise.slow_changes import SlowChange
 from trihedron.transforms import cosine_transform
+
+if TYPE_CHECKING:
+    from trihedron.estimate.noise.slow_changes import SlowChange
 
 SYMBOLS = ("Q", "N", "B", "K")
 """Order of the terms in every basis; the ramp R is a deterministic line and has no density."""

@@ -5,7 +5,7 @@ Gaussian noise have all.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,12 +40,10 @@ def two_levels(x: FloatArray, rate_hz: float) -> TwoLevels | None:
     if means is None:
         return None
     scale = float(means.y.std())
-    if scale == 0.0:
-        return None
-    y = (means.y - means.y.mean()) / scale
-    likelihood, levels, is_high = _switching(y)
+    likelihood, levels, is_high = _switching((means.y - means.y.mean()) / scale)
     n_switches = int(np.count_nonzero(np.diff(is_high)))
-    rise = 2.0 * (likelihood - replace(means, y=y).fitted(np.empty((len(y), 0)))[0])
+    deviance = min(means.likely(np.empty((0, len(means.y))), noise).deviance for noise in means.noises)
+    rise = 2.0 * likelihood + deviance + len(means.coefficients) * math.log(2.0 * math.pi / scale**2)
     if n_switches < FEWEST or rise < EARNED:
         return None
     duration_s = len(x) / rate_hz
