@@ -86,7 +86,9 @@ fn residual(bins: &Bins, value: &Value) -> Vec<f64> {
     let q = bins.cross.len();
     let mut out = bins.power.clone();
     let mut add = |factor: f64, values: &[f64]| {
-        out.iter_mut().zip(values).for_each(|(r, x)| *r += factor * x);
+        out.iter_mut()
+            .zip(values)
+            .for_each(|(r, x)| *r += factor * x);
     };
     for i in 0..q {
         add(-2.0 * value.columns[i], &bins.cross[i]);

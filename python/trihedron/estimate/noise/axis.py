@@ -30,11 +30,13 @@ def straightened(model: Model) -> tuple[Model, float]:
     its additional error is the spread of N over a, weighted by likelihood.
     """
     bent = [_bent(model.spectrum, fall) for fall in FALLS]
-    deviance = np.array([one.fit.deviance for one in bent])
+    # Q rises as the filter falls: beside a filter of any bend it would have any size.
+    fits = [one.likelihood.fit(range(WHITE, len(one.basis))) for one in bent]
+    deviance = np.array([fit.deviance for fit in fits])
     weight = np.exp(-0.5 * (deviance - deviance.min()))
     weight /= weight.sum()
     best = int(np.argmin(deviance))
-    white = np.array([one.fit.strength[WHITE] for one in bent])
+    white = np.array([fit.strength[WHITE] for fit in fits])
     relative = np.sqrt(white / white[best]) - 1.0 if white[best] > 0.0 else np.zeros(len(bent))
     return replace(model, spectrum=bent[best]), math.sqrt(float(weight @ relative**2))
 
