@@ -17,6 +17,9 @@ const ARRIVED: f64 = 1e-7;
 /// Most steps; a fit from a neighbour takes three, one from a rough guess about ten.
 const MOST_STEPS: usize = 80;
 
+/// Share of the information on a column that is added to it: columns may nearly be the same.
+const RIDGE: f64 = 1e-10;
+
 /// A point of the likelihood: strengths of all terms, the deviance there, the columns.
 #[derive(Debug, Clone)]
 pub struct Point {
@@ -61,12 +64,18 @@ fn evaluate(bins: &Bins, strength: &[f64]) -> Value {
     let mut log_determinant = 0.0;
     let mut covariance = DMatrix::zeros(q, q);
     let seen: Vec<usize> = (0..q).filter(|&i| square[(i, i)] > 0.0).collect();
-    if let Some(solver) = square.select_rows(&seen).select_columns(&seen).cholesky() {
-        log_determinant = 2.0 * solver.l().diagonal().map(f64::ln).sum();
+    let scale: Vec<f64> = seen.iter().map(|&i| square[(i, i)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(seen.len(), seen.len(), |a, b| {
+        let ridge = if a == b { RIDGE } else { 0.0 };
+        square[(seen[a], seen[b])] / (scale[a] * scale[b]) + ridge
+    });
+    if let Some(solver) = scaled.cholesky() {
+        let sizes: f64 = scale.iter().map(|s| s.ln()).sum();
+        log_determinant = 2.0 * (solver.l().diagonal().map(f64::ln).sum() + sizes);
         let inverse = solver.inverse();
         for (a, &i) in seen.iter().enumerate() {
             for (b, &j) in seen.iter().enumerate() {
-                covariance[(i, j)] = inverse[(a, b)];
+                covariance[(i, j)] = inverse[(a, b)] / (scale[a] * scale[b]);
             }
         }
     }

@@ -111,7 +111,7 @@ def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) ->
     left, out = best[1][1:], []
     for (time, is_wave), rise in zip(times, rises, strict=True):
         own, left = left[: 1 + is_wave], left[1 + is_wave :]
-        out.append(SlowChange(time * len(x) / rate_hz, tuple(own), rise))
+        out.append(SlowChange(time * len(x) / rate_hz, tuple(own.tolist()), rise))
     return out
 
 
@@ -155,18 +155,21 @@ class Means:
         return [whole[:3], *(np.vstack([whole[:3], row]) for row in whole[3:])]
 
     def likely(self, columns: FloatArray, noise: FloatArray) -> _core.SpectralFit:
-        """The most likely strengths of a ``noise`` (terms, m) beside ``columns`` (c, k)."""
-        c, X = self.coefficients, self.transformed(columns)
+        """The most likely strengths of a ``noise`` (terms, m) beside the coefficients ``columns`` (c, m)."""
+        c, X = self.coefficients, columns
         likelihood = _core.SpectralBins(np.ones(len(c)), c**2, c * X, X[:, np.newaxis] * X, noise)
         return likelihood.fit(range(len(noise)))
 
     def beside(
         self, times: Sequence[tuple[float, bool]], processes: Sequence[float] = CORRELATION
-    ) -> tuple[float, list[float]]:
+    ) -> tuple[float, FloatArray]:
         """Deviance beside the most likely noise, and the sizes of a line and of the changes of these ``times``."""
         columns = np.vstack([self.t, *(self.shape(time, is_wave=is_wave) for time, is_wave in times)])
-        fits = [self.likely(columns, noise) for noise in self.noises[: 1 + len(processes)]]
-        return min((fit.deviance - fit.log_determinant, fit.columns) for fit in fits)
+        # Two exponentials of nearly one time are told apart by their difference.
+        across, size = np.linalg.qr(self.transformed(columns).T)
+        fits = [self.likely(across.T, noise) for noise in self.noises[: 1 + len(processes)]]
+        deviance, found = min((fit.deviance - fit.log_determinant, fit.columns) for fit in fits)
+        return deviance, np.linalg.lstsq(size, np.asarray(found), rcond=None)[0]
 
     def shape(self, time: float, *, is_wave: bool) -> FloatArray:
         """(1 or 2, k) means of an exponential or a wave of ``time`` lengths."""
@@ -215,7 +218,8 @@ def share_of_temperature(x: FloatArray, temperature: FloatArray, breaks: Sequenc
         return 0.0
     u, line = (heat - heat.mean()) / swing, means.t[np.newaxis]
     # In the noise that is most likely without it, whose whitened readings have the walk's increments.
-    sigma = np.sqrt(np.asarray(means.likely(line, means.noises[0]).strength) @ means.noises[0])
+    fit = means.likely(means.transformed(line), means.noises[0])
+    sigma = np.sqrt(np.asarray(fit.strength) @ means.noises[0])
     power = []
     for columns in (line, np.vstack([line, u, u**2, u**3])):
         white, y = (means.transformed(columns) / sigma).T, means.coefficients / sigma

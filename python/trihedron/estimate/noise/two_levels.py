@@ -42,7 +42,7 @@ def two_levels(x: FloatArray, rate_hz: float) -> TwoLevels | None:
     scale = float(means.y.std())
     likelihood, levels, is_high = _switching((means.y - means.y.mean()) / scale)
     n_switches = int(np.count_nonzero(np.diff(is_high)))
-    deviance = min(means.likely(np.empty((0, len(means.y))), noise).deviance for noise in means.noises)
+    deviance = min(means.likely(np.empty((0, len(means.coefficients))), noise).deviance for noise in means.noises)
     rise = 2.0 * likelihood + deviance + len(means.coefficients) * math.log(2.0 * math.pi / scale**2)
     if n_switches < FEWEST or rise < EARNED:
         return None
