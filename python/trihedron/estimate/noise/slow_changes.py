@@ -36,7 +36,8 @@ PLAUSIBLE = float(np.log(MEANS))
 """Least rise of twice the log-likelihood per parameter (size and time of an exponential; amplitude, phase and period of
 a wave) of a change for which intervals allow: with more it is as likely as none (Schwarz)."""
 EARNED = 10.0
-"""Least rise per parameter of a change that is stated and subtracted."""
+"""Least rise per parameter of a change that is stated and subtracted. Chance reaches it in 2e-6 of logs of white noise,
+1e-4 of walk and flicker, 9e-4 of Gauss-Markov noise (benches/static_screening.py)."""
 MOSTLY = 0.5
 """Share of a random walk's power beyond which temperature, not noise, is the larger part of it. Of 6000 axes of white
 noise, flicker, walk or ramp beside an independent temperature (walk, cycle or cooling) none reaches 0.41."""

@@ -15,7 +15,7 @@ from trihedron.estimate.noise.slow_changes import block_means
 EARNED = 20.0
 """Least excess of twice the log-likelihood over the best Gaussian process. By Markov's inequality a likelihood ratio of
 e^10 for levels that are given comes by chance in e^-10 = 5e-5 of logs. With fitted levels, and any number of switches,
-it is 6e-4 in Gauss-Markov noise and 9e-5 at the most in white noise, a walk and flicker (benches/static_screening.py);
+it is 3e-4 in Gauss-Markov noise and 1e-4 at the most in white noise, a walk and flicker (benches/static_screening.py);
 those with ``FEWEST`` switches are fewer."""
 FEWEST = 4
 """Fewest switches; fewer are steps."""
