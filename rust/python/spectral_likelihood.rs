@@ -66,7 +66,7 @@ impl SpectralBins {
             count: count.as_array().to_vec(),
             power: power.as_array().to_vec(),
             cross: rows(cross.as_array()),
-            square: pairs.outer_iter().flat_map(|of_one| rows(of_one)).collect(),
+            square: pairs.outer_iter().flat_map(&rows).collect(),
             basis: rows(basis.as_array()),
         };
         super::run(py, || bins.check().map(|()| Self { bins }))
