@@ -15,6 +15,7 @@ from trihedron.estimate.gravity_error import norm_error
 from trihedron.records import FindingCode, SensorCalibration, Severity
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.simulate.effects import with_effect
+from trihedron.transforms import directions_of
 from true_segments import codes
 
 G = 9.81744
@@ -24,15 +25,13 @@ SIGMA = np.array([0.35, 0.30, 0.42])  # counts: about 0.8 mm/s²
 GRAVITY = 9.81
 SCATTER, BENDS = 8e-3, 2e-2
 """m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""
-EVERYWHERE = np.random.default_rng(0).normal(size=(4000, 3))
-EVERYWHERE /= np.linalg.norm(EVERYWHERE, axis=1, keepdims=True)
+EVERYWHERE = directions_of(np.random.default_rng(0).normal(size=(4000, 3)))
+AXES_OF = np.sum(np.abs(CANDIDATES) > 0.1, axis=1)
 
 
 def cube_poses() -> np.ndarray:
     """(18, 3) unit vectors: six faces and twelve edges of a cube."""
-    grid = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], dtype=float)
-    kept = grid[np.isin(np.abs(grid).sum(axis=1), (1, 2))]
-    return kept / np.linalg.norm(kept, axis=1, keepdims=True)
+    return CANDIDATES[AXES_OF < 3]
 
 
 def readings(up: np.ndarray, seed: int, S: np.ndarray = S_TRUE, b: np.ndarray = B_TRUE) -> np.ndarray:
@@ -164,8 +163,7 @@ def linear_fit(up, bent, sigma):
 
 
 def drawn(rng, n):
-    up = rng.normal(size=(n, 3))
-    return up / np.linalg.norm(up, axis=1, keepdims=True), rng.uniform(1e-3, 3e-3, n)
+    return directions_of(rng.normal(size=(n, 3))), rng.uniform(1e-3, 3e-3, n)
 
 
 def test_sound_poses_have_a_shape_as_often_as_chance_says(monkeypatch):
@@ -226,24 +224,18 @@ def test_bars_hold_for_scatter_and_for_bending(name, n):
             found = found - np.linalg.lstsq(design_of(EVERYWHERE), BENDS * SHAPES[name](EVERYWHERE) @ size)[0]
         white = design_of(up) / sigma[:, None]
         # Errors of the nine relative parameters by noise, and with scatter and nonlinear axes as parameters.
-        noise = np.diag(np.linalg.inv(white.T @ white))
-        before.append(found / np.sqrt(noise * (np.sum((residual / sigma) ** 2) / (n - 9) if name is None else 1.0)))
+        before.append(found / np.sqrt(np.diag(np.linalg.inv(white.T @ white))))
         covariance = _core.norm_fit_covariance(up, residual / GRAVITY, sigma / GRAVITY)
         after.append(found / np.sqrt(np.diag(covariance)))
     # Nine parameters of one session go together: a session counts once, by the share of its nine.
     covered = float(np.mean(np.abs(after) < 1.96))
-    assert covered > binom.ppf(1e-3, n_trials, 0.95) / n_trials
-    if name is not None:
-        assert float(np.mean(np.abs(before) < 1.96)) < 0.75
-    if n == 36 and name is None:
-        # Many poses separate one from the other: uncertainties under scatter stay within half again of what they were.
-        assert float(np.median(np.abs(after) / np.abs(before))) > 2.0 / 3.0
+    assert binom.ppf(1e-3, n_trials, 0.95) / n_trials < covered < 0.99
+    assert float(np.mean(np.abs(before) < 1.96)) < 0.75
 
 
 def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
     # Twelve edges: u³ is u/2 and u⁴ is u²/2 in all of them.
-    pairs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
-    up = np.array([np.insert([a, b], k, 0.0) for k in range(3) for a, b in pairs]) / np.sqrt(2.0)
+    up = CANDIDATES[AXES_OF == 2]
     residual, _ = linear_fit(up, np.random.default_rng(3).normal(size=12) * 4e-4, np.full(12, 4e-4))
     added = _core.norm_fit_covariance(up, residual / GRAVITY, np.full(12, 4e-4 / GRAVITY))
     assert 2e-4 < np.sqrt(np.diag(added)[:6].max()) < 3e-3

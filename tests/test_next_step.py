@@ -90,11 +90,6 @@ def test_the_command_that_a_simulation_of_turns_suggests_gives_a_calibration_wit
     assert "OK: no problems found." in capsys.readouterr().out
 
 
-def test_outputs_are_not_repeated():
-    words = ("noise", "a.csv", "--json=r.json", "--report", "r.html", "--force", "--rate=9")
-    assert now.again(words) == "trihedron noise a.csv --rate=9"
-
-
 def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command_which_replaces_its_file():
     now.begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
     now.note_log(LogSource(log=Path("my log.csv"), rate=50.0))
@@ -105,7 +100,9 @@ def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command_wh
     assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG_1 NEW_LOG_2 --rate 50`"
 
 
-def test_several_logs_are_all_named_in_a_command_of_another_verb():
+def test_a_command_names_all_logs_and_repeats_no_output():
+    words = ("noise", "a.csv", "--json=r.json", "--report", "r.html", "--force", "--rate=9")
+    assert now.again(words) == "trihedron noise a.csv --rate=9"
     now.begin(("diagnose", "one.csv", "two.csv", "--alpha", "0.02", "--gravity", "9.8", "--json", "out.json"))
     said = filled("Calibrate: `trihedron calibrate ... -o calibration.json`.")
     assert said == "Calibrate: `trihedron calibrate one.csv two.csv --gravity 9.8 -o calibration.json`."

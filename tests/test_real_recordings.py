@@ -249,13 +249,10 @@ def adis(real_data):
     return allan(recording, gyroscope_lsb="0.05 deg/s", accelerometer_lsb="3.33 mg")
 
 
-def test_the_white_noise_of_the_adis16405_is_the_published_one(adis):
+def test_what_the_adis16405_log_holds_is_found(adis):
     for axis, published in zip(adis.axes[:3], (0.041, 0.043, 0.039), strict=True):
         assert np.degrees(axis.value("N")) == pytest.approx(published, rel=0.05)
         assert np.degrees(np.sqrt(axis.allan_variance(1.0)[0])) == pytest.approx(published, rel=0.05)
-
-
-def test_what_else_the_adis16405_log_holds_is_found(adis):
     for axis in adis.axes:
         # Its own filter takes half the power at Nyquist; Q is never quoted through it.
         assert FindingCode.SPECTRUM_LOW_PASS in codes(axis)
@@ -290,15 +287,13 @@ def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_dat
 
 
 def test_sessions_of_one_unit_differ_by_what_they_state(real_data):
-    """240 differences of accelerometer scales between sessions of eight units: half lie within 0.5 to 0.9 of their
-    standard uncertainty, of a normal distribution within 0.67."""
+    """240 differences of accelerometer scales: half lie within 0.5 to 0.9 of their error, of a normal one 0.67."""
     z = []
     for unit in range(1, 9):
         logs = (trihedron.read(real_data / f"mimu4444/exp_{k}.npz", instance=unit) for k in (2, 3, 4, 5, 7))
         found = [trihedron.calibrate(log, gravity_m_s2=9.8184).accelerometer for log in logs]
         known = [invariants(one.S, one.b).log_scale for one in found]
-        slopes = [jacobian(one.S, one.b)[3:6] for one in found]
-        sigmas = [np.sqrt(np.diag(d @ one.covariance @ d.T)) for d, one in zip(slopes, found, strict=True)]
+        sigmas = [np.sqrt(np.diag((d := jacobian(one.S, one.b)[3:6]) @ one.covariance @ d.T)) for one in found]
         for (a, of_a), (b, of_b) in itertools.combinations(zip(known, sigmas, strict=True), 2):
             z.extend((a - b) / np.hypot(of_a, of_b))
     assert 0.5 < np.median(np.abs(z)) < 0.9
@@ -314,8 +309,7 @@ def test_two_sessions_of_a_phone_agree(real_data):
         one = trihedron.calibrate(log, gravity_m_s2=9.7974).accelerometer
         by_scale = jacobian(one.S, one.b)[3:6]
         known.append((invariants(one.S, one.b).log_scale, by_scale @ one.covariance @ by_scale.T))
-    (a, of_a), (b, of_b) = known
-    # Eleven poses and eighteen in other directions: a nonlinear axis shifts their scales apart.
+    (a, of_a), (b, of_b) = known  # eleven poses and eighteen: a nonlinear axis shifts their scales apart
     assert (a - b) @ np.linalg.solve(of_a + of_b, a - b) < stats.chi2.isf(0.01, 3)
 
 
