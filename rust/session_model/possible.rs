@@ -63,7 +63,8 @@ impl Fit {
         let bends = session.nonlinear_axes(self)?;
         let hypothesis = Hypothesis::of(self, &bends, &[COLLECTED; N_COEFFICIENTS])?;
         let force = force_tried(self, session, &hypothesis);
-        let rate = rate_tried(&self.strengths, &hypothesis);
+        // Nonlinear axes of the accelerometer say nothing of the gyro's bias.
+        let rate = rate_tried(&self.strengths, &Hypothesis::of(self, &[], &[])?);
         let both = force.iter().flat_map(|(value, of_force)| {
             rate.iter().map(move |(beside, of_rate)| {
                 let mut at = *of_force;
