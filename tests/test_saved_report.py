@@ -177,11 +177,11 @@ def test_a_logarithmic_axis_has_two_figures_to_read_a_scale_from(low, factor):
 
 def test_small_numbers_have_one_notation_in_tables_and_sentences():
     assert with_sigma_and_power(8.804e-5, 1.3e-7) == "(8.804 ± 0.013)e−5"
-    seen = filled("K is below {limit:.2g} {unit:unit}/√s.", {"limit": 7.3e-5, "unit": "m/s^2"}, {})
-    assert seen == "K is below 7.3e−5 m/s²/√s."
-    one = Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "K is below 7.3e−5 m/s².", "", "")
-    (both,) = combined([one, replace(one, seen="K is below 1.2e−4 m/s².")])
-    assert both.seen == "K is below 7.3e−5 to 1.2e−4 m/s²."
+    assert filled("K < {limit:.2g} {unit:unit}/√s.", {"limit": 7.3e-5, "unit": "m/s^2"}, {}) == "K < 7.3e−5 m/s²/√s."
+    axes = ("gyro X: 1 in 60 s.", "gyro X: 2 in 540 s.", "gyro Y: 3 in 61 s.", "gyro Y: 4 in 541 s.")
+    of_each = "Gyro X and Y: 1 to 3 in 60 to 61 s. Gyro X and Y: 2 to 4 in 540 to 541 s."
+    for some, said in ((("K is 7.3e−5 m/s².", "K is 1.2e−4 m/s²."), "K is 7.3e−5 to 1.2e−4 m/s²."), (axes, of_each)):
+        assert combined(Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, one, "", "") for one in some)[0].seen == said
     # A power of ten is a prefix where the unit takes one.
     for exponent, unit, printed in ((-6, "m", "µm"), (-3, "rad/s", "mrad/s"), (-6, "s²/m", "10⁻⁶ s²/m"), (0, "s", "s")):
         assert unit_with_power(exponent, unit) == printed

@@ -98,6 +98,14 @@ def _together(sentences: Sequence[str]) -> str:
     for pattern, name in ((_AXIS, _axes), (_NAMED, _things)):
         parts = [pattern.match(text) for text in sentences]
         if all(parts):
+            # What one axis has twice is no range: the first of every axis, then the second.
+            named = ["" if part is None else part[0][: part.start(part.re.groups)] for part in parts]
+            count = [named[:k].count(one) for k, one in enumerate(named)]
+            if any(count):
+                each = (
+                    [text for text, at in zip(sentences, count, strict=True) if at == k] for k in range(max(count) + 1)
+                )
+                return " ".join(_together(some) for some in each)
             rest = ranged([part[part.re.groups] for part in parts if part is not None])
             if rest is not None:
                 return name([part for part in parts if part is not None], rest)
