@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::order_statistics::median;
 use crate::sensor_model::LOWER;
 
-/// Nonlinearity at 1 g, of |g|: data sheets of consumer accelerometers state 0.1 to 0.5 % of a range of ±2 g or more, of
-/// which a parabola has a quarter at half the range.
+/// Nonlinearity at 1 g, of |g|: data sheets of consumer accelerometers state 0.1 to 0.5 % of a range of ±2 g or more,
+/// of which a parabola has a quarter at half the range.
 const DATA_SHEET: f64 = 1e-3;
 /// Degrees of freedom of the half-t prior of the strength: finite variance, and tails that allow many times the scale.
 const TAIL_DOF: f64 = 4.0;
@@ -131,9 +131,9 @@ fn strengths() -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Second moment `(9, 9)` of the errors of a fit of lengths of gravity: relative errors of the lower triangle of S, row by
-/// row, and of b; from unit verticals, residuals of the lengths and their noise, in units of |g|. Biases may scatter from
-/// pose to pose by any amount, axes be nonlinear beside each (11.12b, 11.12c); `prior` is the standard deviation of the
+/// Second moment `(9, 9)` of the errors of a fit of lengths of gravity: relative errors of the lower triangle of S, row
+/// by row, and of b; from unit verticals, residuals of the lengths and their noise, in units of |g|. Biases may scatter
+/// from pose to pose by any amount, axes be nonlinear beside each (11.12b, 11.12c); `prior` is the standard deviation of the
 /// parameters beforehand, if any.
 ///
 /// # Errors
@@ -197,13 +197,20 @@ pub fn norm_fit_covariance(
             + with_bends.second;
         found.push((beforehand + alone + with_bends.gain, second));
     }
+    Ok(by_evidence(&found))
+}
+
+/// Mean of second moments, each with the logarithm of its evidence.
+#[must_use]
+pub fn by_evidence(found: &[(f64, DMatrix<f64>)]) -> DMatrix<f64> {
     let most = found
         .iter()
         .map(|one| one.0)
         .fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = found.iter().map(|one| (one.0 - most).exp()).sum();
-    Ok(found
-        .into_iter()
-        .map(|(log, second)| second * ((log - most).exp() / total))
-        .sum())
+    let weight = |log: f64| (log - most).exp();
+    let total: f64 = found.iter().map(|one| weight(one.0)).sum();
+    found
+        .iter()
+        .map(|(log, second)| second * (weight(*log) / total))
+        .sum()
 }

@@ -17,7 +17,8 @@ use crate::error::{Error, Result};
 
 /// Prior of the share of disturbed moves: Beta(1, 1 + this).
 const UNDISTURBED: f64 = 18.0;
-/// Excess of the moves' noise: least step of its search, as a factor, and how far it is searched beyond that of the fit.
+/// Excess of the moves' noise: least step of its search, as a factor, and how far it is searched beyond that of the
+/// fit.
 const EXCESS_STEP: f64 = 1.6;
 /// Renewals of the weights by the residuals that they leave, and change of the log-likelihood below which none follows.
 const RENEWALS: usize = 12;
@@ -207,8 +208,8 @@ impl<'a> Mixture<'a> {
 }
 
 impl Fit {
-    /// Evidence and scale of the gyro at every share of lost samples, in order, none the first; `None` where no share is
-    /// likelier than none.
+    /// Evidence and scale of the gyro at every share of lost samples, in order, none the first; `None` where no share
+    /// is likelier than none.
     ///
     /// # Errors
     /// When there are no shares, or the moves determine no scale.

@@ -1,5 +1,5 @@
-//! Uncertainty over all ways in which biases may scatter and walk, and the accelerometer's axes be nonlinear, not only the
-//! most likely one (docs/model-session.md, 11.12b, 11.12c).
+//! Uncertainty over all ways in which biases may scatter and walk, and the accelerometer's axes be nonlinear, not only
+//! the most likely one (docs/model-session.md, 11.12b, 11.12c).
 
 use nalgebra::{Cholesky, DMatrix};
 use rayon::prelude::*;
@@ -44,11 +44,11 @@ fn scatters_beforehand(expected: f64) -> Vec<(f64, f64)> {
 }
 
 impl Fit {
-    /// Covariance of parameters that are linear in the unknowns by `map` `(unknowns, parameters)`, over possible scatters
-    /// and walks of the biases, and nonlinear axes beside each, weighted by their evidence (11.12b, 11.12c).
+    /// Covariance of parameters that are linear in the unknowns by `map` `(unknowns, parameters)`, over possible
+    /// scatters and walks of the biases, and nonlinear axes beside each, weighted by their evidence (11.12b, 11.12c).
     ///
-    /// Some twenty lengths of gravity less nine unknowns detect a scatter as large as their noise in half of all sessions
-    /// only: an uncertainty from the most likely scatter alone is too small there.
+    /// Some twenty lengths of gravity less nine unknowns detect a scatter as large as their noise in half of all
+    /// sessions only: an uncertainty from the most likely scatter alone is too small there.
     ///
     /// # Errors
     /// When a possible scatter of the biases leaves the session undetermined.
@@ -87,15 +87,7 @@ impl Fit {
                 Ok((value + found.0, found.1))
             })
             .collect::<Result<Vec<_>>>()?;
-        let values = found.iter().map(|(value, _)| *value);
-        let best = values.fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = found.iter().map(|(value, _)| (value - best).exp()).sum();
-        let n = map.ncols();
-        Ok(found
-            .into_iter()
-            .fold(DMatrix::zeros(n, n), |sum, (value, one)| {
-                sum + one * ((value - best).exp() / total)
-            }))
+        Ok(nonlinearity::by_evidence(&found))
     }
 }
 
@@ -125,7 +117,7 @@ impl Session {
     }
 }
 
-/// Log-evidence of possible scatters and walks of the accelerometer's bias, with all coefficients of nonlinear axes free.
+/// Log-evidence of possible scatters and walks of the accelerometer's bias, nonlinear axes free.
 fn force_tried(fit: &Fit, session: &Session, hypothesis: &Hypothesis) -> Vec<(f64, Strengths)> {
     let unlikely = -(SCATTERS.len() as f64).ln();
     let mut scatters = scatters_beforehand(session.expected_scatter);
@@ -151,8 +143,8 @@ fn force_tried(fit: &Fit, session: &Session, hypothesis: &Hypothesis) -> Vec<(f6
     out
 }
 
-/// Gain in log-evidence by nonlinear axes of unknown strength in place of free ones, the last unknowns of the border, and
-/// the second moment of the errors of parameters `map` about those of the fit.
+/// Gain in log-evidence by nonlinear axes of unknown strength in place of free ones, the last unknowns of the border,
+/// and the second moment of the errors of parameters `map` about those of the fit.
 fn beside_bends(
     factor: &Factor,
     map: &DMatrix<f64>,

@@ -60,8 +60,9 @@ fn scatters_beforehand(axes: &[f64]) -> Vec<(f64, f64)> {
     std::iter::once((NO_SCATTER, 0.0)).chain(some).collect()
 }
 
-/// Gain in log-evidence by possible scatters in place of the fitted ones, from that by each scatter of each axis, and the
-/// mean square of every axis. Axes scatter alike or independently of one another, each with a probability of one half.
+/// Gain in log-evidence by possible scatters in place of the fitted ones, from that by each scatter of each axis, and
+/// the mean square of every axis. Axes scatter alike or independently of one another, each with a probability of one
+/// half.
 fn averaged(scatters: &[(f64, f64)], gains: &[Vec<f64>; 3]) -> (f64, [f64; 3]) {
     let most = gains
         .each_ref()

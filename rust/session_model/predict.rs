@@ -195,8 +195,8 @@ fn force_map(state: &State, layout: Layout, origin: &Vector3<f64>, n: usize) -> 
     map
 }
 
-/// Adds `factor` times the mean over the poses of one axis of a sensor's biases, without the parts of single poses, to a
-/// parameter.
+/// Adds `factor` times the mean over the poses of one axis of a sensor's biases, without the parts of single poses, to
+/// a parameter.
 fn map_mean_bias(
     map: &mut DMatrix<f64>,
     layout: Layout,

@@ -101,7 +101,8 @@ impl State {
         out
     }
 
-    /// Mean of the raw biases of the accelerometer (0) or the gyro (1) over the poses, without the parts of single poses.
+    /// Mean of the raw biases of the accelerometer (0) or the gyro (1) over the poses, without the parts of single
+    /// poses.
     #[must_use]
     pub fn mean_pose_bias(&self, sensor: usize) -> Vector3<f64> {
         let bias = [&self.pose_force_bias, &self.pose_rate_bias][sensor];

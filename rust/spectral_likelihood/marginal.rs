@@ -4,8 +4,8 @@
 //!
 //! `M(p) = Σ n (ln v + (P − 2 s'C + s'S s)/v) + ln det A`, `A = Σ n S/v`, `s = A⁻¹ Σ n C/v`
 //!
-//! (a flat prior of the coefficients; docs/noise.md, eq. 15) by scoring: a step is a quadratic programme with the Fisher
-//! information, solved exactly on every face of the positive quadrant, and shortened until `M` decreases.
+//! (a flat prior of the coefficients; docs/noise.md, eq. 15) by scoring: a step is a quadratic programme with the
+//! Fisher information, solved exactly on every face of the positive quadrant, and shortened until `M` decreases.
 
 use nalgebra::{DMatrix, DVector};
 

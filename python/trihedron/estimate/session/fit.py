@@ -15,7 +15,7 @@ from trihedron.quantiles import median
 from trihedron.records.words import words
 from trihedron.session.averaging import EITHER, sharpened
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, SessionState, core_state, misfits, state_of
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, NOISE_DOF, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.noise import ANYTHING, NOISE_DOF, START_STRENGTHS, Bounds, Strengths
 
 N_LINEAR = 18
 """Parameters of S and b before those of effects."""
@@ -60,11 +60,6 @@ class SessionSolution:
             return False
         shown = (self.averaging - EITHER) * prior / (prior - variance)
         return shown > 2.0 * max(EITHER, math.sqrt(variance * prior / (prior - variance)))
-
-    @property
-    def is_drifting(self) -> bool:
-        """Whether the accelerometer's bias follows a curve, or walks more than the noise of parts explains."""
-        return self.core.strengths[0][0] < NOISE_CORNER_S or "accel-bias-drift" in self.observed.causes
 
     def as_read(self, measured: MoveMeasurements) -> MoveMeasurements:
         """The moves with this solution's corrections: g-sensitivity, averaging over the interval, position of
