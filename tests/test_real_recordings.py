@@ -287,9 +287,10 @@ def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_dat
 
 
 def test_sessions_of_one_unit_differ_by_what_they_state(real_data):
-    """240 differences of accelerometer scales: half lie within 0.5 to 0.9 of their error, of a normal one 0.67."""
+    """120 differences of accelerometer scales: half lie within 0.5 to 0.9 of their error, of a normal one 0.67."""
     z = []
-    for unit in range(1, 9):
+    # Every second unit: `benches/recordings.py` has all.
+    for unit in range(1, 9, 2):
         logs = (trihedron.read(real_data / f"mimu4444/exp_{k}.npz", instance=unit) for k in (2, 3, 4, 5, 7))
         found = [trihedron.calibrate(log, gravity_m_s2=9.8184).accelerometer for log in logs]
         known = [invariants(one.S, one.b).log_scale for one in found]
@@ -297,8 +298,8 @@ def test_sessions_of_one_unit_differ_by_what_they_state(real_data):
         for (a, of_a), (b, of_b) in itertools.combinations(zip(known, sigmas, strict=True), 2):
             z.extend((a - b) / np.hypot(of_a, of_b))
     assert 0.5 < np.median(np.abs(z)) < 0.9
-    # Of 96 independent ones 95 %, within two standard errors.
-    assert 0.905 < np.mean(np.abs(z) < 1.96) < 0.995
+    # Of 48 independent ones 95 %, within two standard errors.
+    assert 0.887 < np.mean(np.abs(z) < 1.96) <= 1.0
 
 
 def test_two_sessions_of_a_phone_agree(real_data):

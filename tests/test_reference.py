@@ -239,7 +239,7 @@ def test_a_clock_that_jumps_for_some_seconds_leaves_a_deviating_interval_and_the
 
 
 def test_a_reference_that_slips_on_the_body_is_told_from_a_wobble_with_its_time_and_angle():
-    trial = tracked(3, 60, 0.01, has_path=True)
+    trial = tracked(3, 45, 0.01, has_path=True)
     time = trial.motion.time_s
     axis = np.array([0.6, 0.0, -0.8])
 
@@ -251,13 +251,13 @@ def test_a_reference_that_slips_on_the_body_is_told_from_a_wobble_with_its_time_
         return fit_reference(trial.log, replace(trial.motion, attitude=attitude), G).findings
 
     assert all(one.code is not FindingCode.REFERENCE_APART for one in turned_by(np.sin(time / 4.0)))
-    findings = turned_by(np.where(time > 30.0, 2.0, 0.0))
+    findings = turned_by(np.where(time > 20.0, 2.0, 0.0))
     (apart,) = (one for one in findings if one.code is FindingCode.REFERENCE_APART)
     assert apart.severity is Severity.SERIOUS
-    assert apart.numbers["at_s"] == pytest.approx(30.0 - trial.lead_s, abs=1.5)
+    assert apart.numbers["at_s"] == pytest.approx(20.0 - trial.lead_s, abs=1.5)
     assert abs(apart.numbers["angle_rad"] - np.radians(2.0)) < 4.5 * apart.numbers["sigma_rad"]
     # N of a filter contains no slip; the reference's own error does.
-    slipped = trial.motion.attitude @ turned(np.where(time > 30.0, 2.0, 0.0))
+    slipped = trial.motion.attitude @ turned(np.where(time > 20.0, 2.0, 0.0))
     asked = Request((1.0, 10.0), 20.0, G)
     _, noted = beside_reference(trial.log, replace(trial.motion, attitude=slipped), asked)
     (apart,) = (one for one in noted if one.code is FindingCode.REFERENCE_APART)
