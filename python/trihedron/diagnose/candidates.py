@@ -20,7 +20,7 @@ N_RIVALS = 3
 """Rivals fitted in full."""
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
-RESCALED = (3.0, 0.3)
+RESCALED = (10.0, 3.0, 0.3)
 """Factors on the prior width at which candidates are evaluated again."""
 N_LEADERS = 3
 """Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted."""
@@ -64,7 +64,7 @@ def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried
 def candidates_beside(
     model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str]
 ) -> tuple[list[Tried], dict[str, str]]:
-    """Candidates to add to a hypothesis, best first, one per effect; and the reasons why others do not apply."""
+    """Candidates to add to a hypothesis, best first; and the reasons why others do not apply."""
     offered, missing = offered_beside(model, effects, exclude)
     leading = _leaders(model, offered, price_of_choice(model, effects))
     if not leading:
@@ -88,16 +88,18 @@ def candidates_beside(
 def _best_of_each(
     terms: Sequence[Term], asked: Sequence[AddedTerms], plain: float, *, is_stated: bool = False
 ) -> list[Tried]:
-    """The best shape with a plausible size of every effect, best effect first; where it ``is_stated`` what a log says
-    of an effect also one without evidence whose size is none (a delay far from those that were tried)."""
-    best: dict[str, tuple[bool, float, Tried]] = {}
+    """The best shape with a plausible size of every effect, and the best of those whose shape can be fitted, best
+    first; where it ``is_stated`` what a log says of an effect also one without evidence whose size is none (a delay far
+    from those that were tried)."""
+    best: dict[tuple[str, bool], tuple[bool, float, Tried]] = {}
     for term, one in zip(terms, asked, strict=True):
         score = 2.0 * (one.log_evidence - plain) - term.cost
         is_plausible = term.effect.is_plausible(term.variant, one.value, one.covariance)
         rank = is_plausible, score, Tried(term, score, one)
         is_none = is_stated and score <= 0.0 and not term.effect.of_session
-        if (is_plausible or is_none) and rank[:2] > best.get(term.effect.id, (False, -np.inf))[:2]:
-            best[term.effect.id] = rank
+        kind = term.effect.id, bool(term.variant.shape)
+        if (is_plausible or is_none) and rank[:2] > best.get(kind, (False, -np.inf))[:2]:
+            best[kind] = rank
     return sorted((one for *_, one in best.values()), key=lambda one: -one.score)
 
 
@@ -161,10 +163,15 @@ def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
     return is_plausible or effect.rescaled(model.context, term.variant, look.value) is not None
 
 
+def worth_fitting(tried: Sequence[Tried]) -> list[Tried]:
+    """Those of some candidates, best first, that are near the best."""
+    first = tried[0].score if tried else 0.0
+    return [one for one in tried if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)]
+
+
 def with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
     """The hypothesis with the best of the candidates near the first, each fitted in full."""
-    first = standing[0].score
-    near = [one for one in standing if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)][:N_RIVALS]
+    near = worth_fitting(standing)[:N_RIVALS]
     best: tuple[float, Hypothesis, Term] | None = None
     for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
         value, covariance = larger.value(len(larger.terms) - 1)

@@ -21,6 +21,7 @@ from trihedron.diagnose.candidates import (
     as_fits_best,
     candidates_beside,
     with_best,
+    worth_fitting,
 )
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
@@ -144,9 +145,9 @@ class _Search:
         if swapped is not model:
             model, without = self._pruned(swapped)
         model, without, beside = self._beside_relations(model, without)
-        tried, missing = all_beside(model, self.effects)
-        # Results with noise strengths refitted replace those at the strengths of the answer.
-        tried += candidates_beside(model, self.effects, ())[0]
+        stated, missing = all_beside(model, self.effects)
+        # Results with noise strengths refitted replace those at the strengths of the answer, of an effect the best.
+        tried = [*reversed(stated), *reversed(candidates_beside(model, self.effects, ())[0])]
         held = {term.effect.id for term in model.terms}
         return Found(
             model, beside, {one.term.effect.id: one for one in tried},
@@ -178,9 +179,9 @@ class _Search:
         for k, fewer in enumerate(without):
             term = model.terms[k]
             scored = [(2.0 * model.log_evidence - term.cost, model, term)]
-            tried, _ = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms})
-            own = 2.0 * (model.log_evidence - fewer.log_evidence) - term.cost
-            for other in [one for one in tried if one.score > own - WORTH_FITTING][:N_RIVALS]:
+            tried, _ = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms} - {term.effect.id})
+            rivals_of_it = [one for one in worth_fitting(tried) if one.term.effect.id != term.effect.id]
+            for other in rivals_of_it[:N_RIVALS]:
                 fitted = as_fits_best(fewer, other)
                 changed = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
                 if fitted.effect.is_plausible(fitted.variant, *changed.value(k)):
@@ -191,6 +192,7 @@ class _Search:
                 t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect
             )
             against |= {one.term.effect.id: chosen.effect.id for one in tried if one.score > self.limit}
+            against.pop(chosen.effect.id, None)
         return model, rivals, against
 
     def _beside_relations(

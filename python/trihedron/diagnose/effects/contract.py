@@ -3,8 +3,9 @@
 To add one: write a file in this folder with a subclass of :class:`Effect` and nothing else (docs/adding-an-effect.md).
 """
 
+import itertools
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Distortion
+from trihedron.diagnose.session.solve import Distortion, stacked
 from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain, HeldOut, Where
@@ -216,6 +217,12 @@ def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: st
 def acting_on(sensor: int, columns: FloatArray) -> Distortion:
     """Columns (points, 3, k) that a sensor (0 accelerometer, 1 gyro) alone reads."""
     return Distortion(None, columns) if sensor else Distortion(columns, None)
+
+
+def joined(variants: Sequence[Variant], label: str = "") -> Variant:
+    """Variants that act together, as one."""
+    names, units = (tuple(itertools.chain(*each)) for each in zip(*((v.names, v.units) for v in variants), strict=True))
+    return Variant(stacked([v.distortion for v in variants]), names, units, label=label)
 
 
 def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:

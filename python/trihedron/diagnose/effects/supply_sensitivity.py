@@ -3,7 +3,7 @@
 import numpy as np
 
 from trihedron.diagnose.context import LEAST_SWING_V, Context
-from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axes, per_axis
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, joined, on_axes, per_axis
 from trihedron.records.words import why_not
 
 
@@ -27,4 +27,5 @@ class SupplySensitivity(Effect):
                 names = per_axis(f"{prefix}_scale") + per_axis(f"{prefix}_offset")
                 columns = on_axes(context, sensor, v * context.axis_motion(sensor), v)
                 out.append(Variant(columns, names, ("1",) * 3 + (unit,) * 3, label=label))
-        return out
+        # Both sensors of a chip have one supply.
+        return [*out, joined(out, label="both")] if len(out) > 1 else out
