@@ -96,12 +96,9 @@ class _Search:
 
     def added(self, model: Hypothesis) -> Hypothesis:
         """The hypothesis with effects added one at a time until none scores above the threshold."""
-        drifts = {one.id for one in self.effects if isinstance(one, BiasProcess)}
-        # Every hypothesis contains bias drift as a walk: a smooth curve is tried after the effects that explain more.
-        for exclude in (drifts, {one.id for one in self.effects} - drifts):
-            larger: Hypothesis | None = model
-            while larger is not None:
-                model, larger = larger, self._with_one_more(larger, exclude)
+        larger: Hypothesis | None = model
+        while larger is not None:
+            model, larger = larger, self._with_one_more(larger, ())
         return model
 
     def _with_one_more(self, model: Hypothesis, exclude: Collection[str]) -> Hypothesis | None:
