@@ -260,11 +260,13 @@ def read_in(unit):
 
 def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
     S = np.diag([1.74e-4, 1.75e-4, 1.76e-4])
-    (found,) = scale_findings(S, read_in(RateUnit.DEG_S))
+    (found,) = scale_findings(S, 0.0, read_in(RateUnit.DEG_S))
     assert found.severity is Severity.SERIOUS
     assert found.numbers["scale_ratio"] == pytest.approx(0.01, rel=0.01)
-    assert list(scale_findings(100.0 * S, read_in(RateUnit.DEG_S))) == []
-    assert list(scale_findings(S, read_in(RateUnit.COUNTS))) == []
+    assert list(scale_findings(100.0 * S, 0.0, read_in(RateUnit.DEG_S))) == []
+    assert list(scale_findings(S, 0.0, read_in(RateUnit.COUNTS))) == []
+    # Moves that hardly determine the scale contradict nothing.
+    assert list(scale_findings(S, 2.0, read_in(RateUnit.DEG_S))) == []
 
 
 def test_a_clock_at_half_speed_is_named_once_with_the_options_that_mend_it(tmp_path):
@@ -284,7 +286,7 @@ def test_a_clock_at_half_speed_is_named_once_with_the_options_that_mend_it(tmp_p
 def test_three_gyro_scales_off_by_one_factor_are_a_matter_of_the_timestamps():
     for factor, scatter, n in ((1.1, (0.5, -0.5, 0.2), 1), (1.1, (9.0, -5.0, 1.0), 0), (1.02, (0.1, -0.1, 0.0), 0)):
         S = np.diag(factor * (1.0 + 0.01 * np.array(scatter)))
-        found = list(scale_findings(S, read_in(RateUnit.RAD_S)))
+        found = list(scale_findings(S, 0.0, read_in(RateUnit.RAD_S)))
         assert [one.severity for one in found] == [Severity.WARNING] * n
 
 

@@ -198,7 +198,7 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     possible = [one.numbers["sigma_scale"] for one in fitted if one.code is FindingCode.LOSSES_POSSIBLE]
     sigma_scale = min([relative_sigma(gyro.covariance, gyro.S), *possible])
     missing = tuple(missing_samples(recording, segments, sigma_scale))
-    of_gyro = (*scale_findings(gyro.S, recording), *sense_findings(calibration, recording, segments))
+    of_gyro = (*scale_findings(gyro.S, sigma_scale, recording), *sense_findings(calibration, recording, segments))
     # Losses detected in the motion are not also possible ones of the fit.
     fitted = tuple(one for one in fitted if not (missing and one.code is FindingCode.LOSSES_POSSIBLE))
     return (*fitted, *of_gyro, *missing)

@@ -12,19 +12,22 @@ from trihedron.units import RateUnit, rate_to_si
 
 MAX_SCALE_RATIO = 1.25
 """Ratio to the nominal scale above which the unit or the rate is wrong: MEMS gyros are within 10 % of data sheets."""
+BEYOND = 3.0
+"""Standard errors from the nominal scale below which moves contradict no unit: they hardly determine it."""
 ONE_FACTOR = 0.01
 """Probability that three scales which differ from axis to axis by chance look like one factor."""
 
 
-def scale_findings(S: FloatArray, recording: Recording) -> Iterator[Finding]:
-    """Finding for a common scale that contradicts the unit of the log: unit, sampling rate or timestamps are wrong."""
+def scale_findings(S: FloatArray, sigma: float, recording: Recording) -> Iterator[Finding]:
+    """Finding for a common scale that contradicts the unit of the log: unit, sampling rate or timestamps are wrong.
+    ``sigma`` is its relative standard error."""
     raw_unit = recording.gyroscope_unit
     nominal = rate_to_si(raw_unit)
     if nominal is None:
         return
     each = np.log(np.linalg.norm(S, axis=0) / nominal)
     common, spread = float(np.mean(each)), float(np.std(each, ddof=1))
-    if not np.isfinite(common):
+    if not abs(common) > BEYOND * sigma:
         return
     if abs(common) > np.log(MAX_SCALE_RATIO):
         ratios = {one: nominal * np.exp(common) / si for one in RateUnit if (si := rate_to_si(one))}
