@@ -1,32 +1,30 @@
 """Range limit reached: the reading stays on a plateau while the motion continues."""
 
-from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import AXES, BoolArray, FloatArray
-from trihedron.channel_facts.possible_limits import BAND_SIGMA, MIN_PLATEAUS
+from trihedron.channel_facts.possible_limits import REACH
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
-from trihedron.probability import LEAST_P, MEDIAN_CHI2
+from trihedron.probability import LEAST_P
 from trihedron.records.channel_facts import Limit
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
-from trihedron.session.model import DYNAMICS, MOVES
+from trihedron.session.model import NOTHING
+from trihedron.session.noise import ANYTHING
 
 HALF_WINDOW = 6
 """Samples on either side of an interval that determine the local motion."""
 NEAR_LIMIT = 0.97
 """Share of a limit above which a move is excluded, on any axis: the limit belongs to the sensor, not to one axis."""
-CONTRADICTION = 4.0
-"""Chi-square per row of the moves at a limit, over that of the others, above which their readings are false."""
-FEWEST_OTHERS = 10
-"""Rows of other moves from which their median is used: its relative error is then 75 %."""
+BEYOND, N_SIGMA = 0.1, 3.0
+"""Least share of the parabola on a plateau by which the motion exceeds the limit, by so many standard errors: one of
+constant rate does not."""
 ONE_CODE = 1e-30
 """Chance that a part without a limit repeats one code at the end of its range."""
 ABOVE_REST = 1.2
@@ -93,14 +91,11 @@ class _Saturation(DirectEffect):
         if raw is None or density is None or not runs:
             return None
         sigma = density * np.sqrt(obs.recording.rate_hz)
-        touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
-        misfit, usual, n_rows = self._misfit(context, touched)
-        # Repeated plateaus on one level need no comparison: where most moves are clipped, all disagree.
-        repeats = max(Counter((run.axis, run.sign) for run in runs).values()) >= MIN_PLATEAUS
-        contradicts = misfit > CONTRADICTION * (1.0 if repeats else usual)
-        is_rail = any(run.is_rail for run in runs)
-        if not contradicts and not is_rail:
+        gain = self._gain(context, [run for run in runs if not run.is_rail], raw)
+        runs = [run for run in runs if run.is_rail or gain > 0.0]
+        if not runs:
             return None
+        touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
         touched = self._near_limit(context, runs, touched, raw)
         begins = set(obs.move_poses[touched, 0].tolist())
         t = obs.time_s
@@ -109,11 +104,7 @@ class _Saturation(DirectEffect):
         statement = self.reported(
             "plateaus", plateaus=len(runs), samples=_n_samples(runs), touched=len(touched), moves=obs.n_moves
         )
-        # Chance that smooth peaks of different moves end within one noise band of each other, times the chance that
-        # undisturbed moves disagree so much more than the others.
-        p = (2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1)
-        p = max(min(p, 1.0) * float(chdtrc(n_rows, misfit * n_rows / usual)), LEAST_P)
-        p = min(p, ONE_CODE) if is_rail else p
+        p = max(min(float(np.exp(-gain)), ONE_CODE if any(run.is_rail for run in runs) else 1.0), LEAST_P)
         return Evidence(
             p, -2.0 * np.log(p), self._limits(context, runs, sigma), statement, "moves" if is_gyro else "dynamics",
             Where(channels, obs.move_names(touched[:8]), times),
@@ -121,19 +112,26 @@ class _Saturation(DirectEffect):
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had biased the scale factors
         )  # fmt: skip
 
-    def _misfit(self, context: Context, touched: list[int]) -> tuple[float, float, int]:
-        """Chi-square per row of the moves with a plateau, the usual one of the others, and the number of those rows.
+    def _gain(self, context: Context, runs: list[Plateau], raw: FloatArray) -> float:
+        """Gain in log-evidence by a motion that goes on beyond the limit, the readings cut off; 0 where it does not.
 
-        Rotations at a constant rate give plateaus too. A false reading contradicts gravity (gyro) or velocity
-        (accelerometer) after the move, and more than in moves within the range. Not both: velocity also contradicts
-        where the accelerometer is away from the axis of a table, gravity where the gyro is wrong.
+        Rotations at a constant rate give plateaus too. Slopes at both ends of a plateau state a parabola above it; what
+        gravity and velocity after the moves say of its size tells a limit from a constant rate.
         """
-        system = context.fitted.system
-        rows = (system.domain == (MOVES if self.sensor == GYRO else DYNAMICS)) & (system.walk == 0)
-        at_limit, squared = np.isin(system.segment, touched), system.residual**2
-        others = squared[rows & ~at_limit]
-        usual = max(float(np.median(others)) / MEDIAN_CHI2[1], 1.0) if len(others) >= FEWEST_OTHERS else 1.0
-        return float(np.mean(squared[rows & at_limit])), usual, int((rows & at_limit).sum())
+        if not runs:
+            return 0.0
+        cut = np.zeros((len(raw), 3))
+        for run in runs:
+            x, n = raw[:, run.axis] * run.sign, run.stop - run.start
+            arrival, departure = x[run.start] - x[run.start - REACH], x[run.stop - 1] - x[run.stop - 1 + REACH]
+            u = (np.arange(n) + 0.5) / n
+            cut[run.start : run.stop, run.axis] -= run.sign * min(arrival, departure) / REACH * n * u * (1.0 - u)
+        columns = context.on_axes(self.sensor, context.at_points(cut) * context.si_per_raw(self.sensor))
+        column = np.ascontiguousarray(columns.sum(axis=2, keepdims=True))
+        sides = (None, column) if self.sensor == GYRO else (column, None)
+        core = context.fitted.core
+        (plain, *_), (beyond, _, size, variance) = core.evidence([NOTHING, (*sides, [1.0])], [core.strengths], ANYTHING)
+        return float(beyond - plain) if size[0] - N_SIGMA * np.sqrt(variance[0, 0]) > BEYOND else 0.0
 
     def _si(self, context: Context) -> tuple[FloatArray, FloatArray, FloatArray]:
         """SI per raw unit along each axis, the SI value of a centred raw reading of zero, and the origin."""
