@@ -8,7 +8,9 @@ from scipy.interpolate import CubicSpline
 
 import trihedron
 from confidence import design
-from confidence.sensor import recorded
+from confidence.motion import Step, attitude, move
+from confidence.sensor import read_out, recorded
+from confidence.sessions import directions
 from diagnosed_session import unit_of
 from trihedron.diagnose.effects.timing_jitter import SURE, common_time_variance
 from trihedron.diagnose.session.observations import observe
@@ -92,6 +94,44 @@ def test_play_and_creep_are_told_apart(variant, size):
     first = diagnosed(scenario).effects[0]
     assert first.id == "accel-hysteresis"
     assert first.model["variant"] == variant
+
+
+class Machine:
+    """Numbers of a machine in place of those of a hand: no sway, no tremor, no push."""
+
+    def normal(self, size):
+        return np.zeros(size)
+
+    def uniform(self, low, _high, size=None):
+        return np.full(size, low) if size else 1.0
+
+
+def test_a_table_at_a_constant_rate_is_at_no_range_limit_though_moves_disagree():
+    rng = np.random.default_rng(2)
+    first, *others = (attitude(up, rng.uniform(0.0, 6.28)) for up in directions(20, rng))
+    steps = [Step(4.0)] + [step for to in others for step in (Step(5.0, to=to, law="table"), Step(4.0))]
+    motion, per = move(steps, first, Machine(), 100.0)
+    force, rate, rate_hz, truth = read_out(motion, per, rng)
+    quadratic = 4e-4 * (force @ truth.S_f.T + truth.b_f) ** 2
+    force = force + np.round(np.linalg.solve(truth.S_f, quadratic.T).T)
+    found = trihedron.diagnose(recorded(force, rate, rate_hz), gravity_m_s2=9.80665)
+    assert [one.id for one in found.effects] == ["accel-quadratic"]
+
+
+def test_a_gyro_whose_moves_are_all_beyond_its_range_is_not_extended():
+    result = trihedron.calibrate(
+        simulate(with_effect(session(), "gyro-saturation", limit=0.8), 1)[0], gravity_m_s2=9.80665
+    )
+    known = trihedron.extend(result).calibration
+    assert not known.is_trustworthy
+    assert np.array_equal(known.gyroscope.S, result.gyroscope.S)
+
+
+def test_large_effects_of_both_sensors_are_found_and_a_drift_is_no_temperature():
+    warming = replace(session(seed=2), environment=WARMING)
+    bent = with_effect(warming, "gyro-scale-nonlinearity", c3=(6e-3, 5e-3, 4e-3))
+    found = diagnosed(with_effect(bent, "accel-bias-drift", amplitude=(0.28, 0.29, -0.37), tau_s=70.0))
+    assert {one.id for one in found.effects} == {"gyro-scale-nonlinearity", "accel-bias-drift"}
 
 
 def test_the_earth_is_no_force_on_the_gyro_where_clipped_moves_break_the_chain_of_headings():

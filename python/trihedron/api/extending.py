@@ -76,14 +76,19 @@ DRIFTS = "accel-bias-drift", "gyro-bias-drift"
 
 
 def _spoilt(diagnosis: Diagnosis) -> Finding | None:
-    """A finding where the effects raise the cross-validated rms of a domain by more than chance; else None."""
+    """A finding where nothing determines the gyro beside the effects, or they raise the cross-validated rms of a domain
+    by more than chance; else None."""
+    effects = [effect.id for effect in diagnosis.effects]
+    gyro, covariance = diagnosis.extended.gyroscope, diagnosis.extended.covariance
+    if gyro is not None and covariance is not None and np.diag(covariance)[12:21].max() > np.square(gyro["S"]).max():
+        return Finding.of(FindingCode.EFFECTS_MODELLED, "undetermined", effects=effects, n_effects=len(effects))
     for before, after in diagnosis.predicted:
         if after.rms > MAY_RISE * before.rms:
             return Finding.of(
                 FindingCode.EFFECTS_MODELLED,
                 "stays-linear",
-                effects=[effect.id for effect in diagnosis.effects],
-                n_effects=len(diagnosis.effects),
+                effects=effects,
+                n_effects=len(effects),
                 domain=before.domain,
                 rms_before=before.rms,
                 rms_after=after.rms,

@@ -165,7 +165,8 @@ def verdict(calibration: Calibration, errors_beside: str = "") -> str:
         above += ", for the accelerometer alone"
     if any(f.code is FindingCode.ACCELEROMETER_NOMINAL for f in calibration.findings):
         above += ", for the gyro alone"
-    effects = [f.seen for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED]
+    modelled = (f for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED)
+    effects = [f.seen for f in modelled if f.severity is not Severity.SERIOUS]
     whole = verdict_of(calibration.findings, "OK: no problems found.", above, "NOT TO BE TRUSTED")
     warned = [f for f in calibration.findings if f.severity is Severity.WARNING]
     drifts = [f"{capital(opening(f.seen))}." for f in warned if f.code in DRIFTS]

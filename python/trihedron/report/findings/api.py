@@ -181,6 +181,12 @@ _DIAGNOSE = {
         "`trihedron diagnose` shows them; record another session to see which of them return.",
         numbers=("n_effects",),
     ),
+    (Code.EFFECTS_MODELLED, "undetermined", SERIOUS): Words(
+        "The calibration stays linear: beside {effects:ids} nothing determines the gyro's S.",
+        "The moves that show it are those that the effects spoil.",
+        "Record moves that these effects do not reach; `trihedron diagnose` shows which were excluded.",
+        numbers=("n_effects",),
+    ),
     (Code.EFFECTS_MODELLED, "none", NOTE): Words(
         "The diagnosis accepted no effect: the linear model is unchanged.",
         numbers=("left", "n_effects", "n_domains_left"),
