@@ -48,7 +48,8 @@ pub struct Poses<'a> {
 pub struct Settling {
     /// Twice the log-likelihood that it gains over scatter, less the cost of the time constants tried.
     pub score: f64,
-    /// The same score of a bias that settles, or that by which gravity prefers it to a rotation, whichever is less.
+    /// The same score of a bias that settles, over scatter or the support, whichever is likelier; or that by which gravity
+    /// prefers it to a rotation of any course, whichever is less.
     pub of_bias: f64,
     /// Motion of every pose.
     pub motion: Vec<PoseMotion>,
@@ -135,7 +136,7 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     let of_bias: f64 = seen.iter().flatten().map(|one| one.of_bias).sum();
     Ok(Some(Settling {
         score: score(support.0, scatter),
-        of_bias: score(bias.0, scatter).min(2.0 * of_bias),
+        of_bias: score(bias.0, scatter.max(support.0)).min(2.0 * of_bias),
         motion: motions(poses, seen, support.1, support.2),
     }))
 }
