@@ -222,22 +222,11 @@ pub fn fit(bins: &Bins, free: &[usize]) -> Result<Point> {
 
 /// The most likely strengths of `free` from several starts; strengths that are not free are zero.
 pub(super) fn best(bins: &Bins, free: &[usize]) -> Point {
-    let guess = |left_out: Option<usize>| {
-        let mut start = vec![0.0; bins.basis.len()];
-        for &k in free.iter().filter(|&&k| Some(k) != left_out) {
-            start[k] = first_guess(bins, k);
-        }
-        start
-    };
-    let mut starts = vec![guess(None)];
-    if free.len() > 1 {
-        starts.extend(free.iter().map(|&k| guess(Some(k))));
+    let mut start = vec![0.0; bins.basis.len()];
+    for &k in free {
+        start[k] = first_guess(bins, k);
     }
-    starts
-        .iter()
-        .map(|start| fit_from(bins, free, start))
-        .min_by(|a, b| a.deviance.total_cmp(&b.deviance))
-        .unwrap_or_else(|| fit_from(bins, free, &guess(None)))
+    fit_from(bins, free, &start)
 }
 
 /// Standard error of the strength `k`, the others free: the scale of a search along it.

@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.channel_facts.low_pass import RISE
 from trihedron.estimate.noise import remarks
-from trihedron.estimate.noise.binned import BinnedSpectrum, Model, model_of
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model, models_of
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates
@@ -112,8 +112,8 @@ def gauss_markov_of(found: _core.SpectralInversion, model: Model) -> GaussMarkov
         sigma_process=found.most_likely[k],
         correlation_time_s=model.correlation_time_s,
         sigma=found.spread[k],
-        lower=found.lower[k],
-        upper=found.upper[k],
+        lower=min(found.lower[k], model.reach[0]),
+        upper=max(found.upper[k], model.reach[1]),
         evidence=model.evidence,
     )
 
@@ -134,17 +134,12 @@ def identify_axis(
 ) -> NoiseAxis:
     """``blank`` with the terms of its spectrum, its lines, and findings.
 
-    ``choices`` are the bands of equally likely slow changes: intervals reach over all of them, a term is named where it
-    is needed beside each, the rest is that of the first. ``tails`` is the part of N's relative standard error due to
-    non-Gaussian tails, which a spectrum does not show; ``range_degc`` is that of the logged temperature.
+    ``choices`` are the bands beside equally likely slow changes. ``tails`` is the part of N's relative standard error
+    due to non-Gaussian tails, which a spectrum does not show; ``range_degc`` is that of the logged temperature.
     """
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     blank = replace(blank, longest_tau_s=float(usable[-1]) if len(usable) else 0.0)
-    axis, *others = (_of_spectrum(bands, blank, tails) for bands in choices)
-    for other in others:
-        terms = {name: _either(term, other.terms[name]) for name, term in axis.terms.items()}
-        pair = min(axis.slow_pair, other.slow_pair, key=lambda one: one.evidence)
-        axis = replace(axis, terms=MappingProxyType(terms), slow_pair=pair)
+    axis = _of_spectra(choices, blank, tails)
     return replace(axis, findings=(*axis.findings, *remarks.about_terms(axis, range_degc)))
 
 
@@ -163,42 +158,76 @@ def _either(one: NoiseTerm, other: NoiseTerm) -> NoiseTerm:
     )
 
 
-def _of_spectrum(bands: Sequence[Ordinates], blank: NoiseAxis, tails: float) -> NoiseAxis:
+def _of_spectra(choices: Sequence[Sequence[Ordinates]], blank: NoiseAxis, tails: float) -> NoiseAxis:
+    """The axis by all models of all ``choices``: intervals reach over them, what is not needed in each is not named."""
+    bands = choices[0]
     # With scattered losses and slow noise only block means are used: their spectrum ends below Nyquist.
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
-    highest, at_nyquist = white_limit(bands, nyquist, None)
-    model = model_of(bands, highest, tolerance=TOLERANCE if highest < nyquist else 0.0)
-    lines, masks = find_lines(bands, model, 1.0 / blank.rate_hz)
+    masks: list[BoolArray] | None = None
+
+    def models(bands: Sequence[Ordinates]) -> list[Model]:
+        return models_of(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
+
+    highest, at_nyquist = white_limit(bands, nyquist, masks)
+    likely = models(bands)
+    lines, masks = find_lines(bands, likely[0], 1.0 / blank.rate_hz)
     if lines:
         findings.append(remarks.lines(lines, blank.unit))
         highest, at_nyquist = white_limit(bands, nyquist, masks)
-        model = model_of(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
+        likely = models(bands)
     if highest < nyquist or math.isnan(at_nyquist):
         findings.append(remarks.coloured(highest, nyquist, at_nyquist))
-    bend = 0.0
-    if highest < nyquist:
-        model, bend = straightened(model)
+    tails = math.hypot(tails, level_share(blank.sample_sigma, blank.resolution))
+
+    def stated(model: Model) -> _Stated:
+        return _stated(model, tails, is_filtered=highest < nyquist)
+
+    first, *rest = map(stated, likely)
+    # Beside changes that are only plausible no other process is, but one that is stated is kept where it may be.
+    rest += [stated(models(bands)[0 if first.gauss_markov is None else -1]) for bands in choices[1:]]
+    if first.worst is not None:
+        deviation, frequency_hz = first.worst
+        findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=deviation, frequency_hz=frequency_hz))
+    terms = first.terms
+    for other in rest:
+        terms = {name: _either(term, other.terms[name]) for name, term in terms.items()}
+    return replace(
+        blank,
+        terms=MappingProxyType(terms),
+        gauss_markov=first.gauss_markov,
+        slow_pair=first.pair,
+        lines=tuple(lines),
+        lowest_hz=first.lowest_hz,
+        highest_hz=float(highest),
+        covariance_scale=first.scale,
+        findings=(*blank.findings, *findings),
+    )
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """Statements about one model; ``scale`` is the largest factor on a variance, ``worst`` the deviation (share, Hz) of
+    a half octave that the terms do not explain."""
+
+    terms: dict[TermName, NoiseTerm]
+    gauss_markov: GaussMarkov | None
+    pair: SlowPair
+    lowest_hz: float
+    scale: float
+    worst: tuple[float, float] | None
+
+
+def _stated(model: Model, tails: float, *, is_filtered: bool) -> _Stated:
+    model, bend = straightened(model) if is_filtered else (model, 0.0)
     model, scale, worst = _tempered(model)
-    if worst is not None:
-        findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=worst[0], frequency_hz=worst[1]))
     found = model.spectrum.likelihood.invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
     alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
     pair = SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
     terms = terms_of(found, pair)
-    white, level = terms[TermName.WHITE], level_share(blank.sample_sigma, blank.resolution)
-    terms[TermName.WHITE] = widened(white, math.hypot(level, bend, tails) * white.estimate)
-    return replace(
-        blank,
-        terms=MappingProxyType(terms),
-        gauss_markov=gauss_markov_of(found, model),
-        slow_pair=pair,
-        lines=tuple(lines),
-        lowest_hz=float(model.spectrum.frequency_hz[0]),
-        highest_hz=float(highest),
-        covariance_scale=scale,
-        findings=(*blank.findings, *findings),
-    )
+    white = terms[TermName.WHITE]
+    terms[TermName.WHITE] = widened(white, math.hypot(bend, tails) * white.estimate)
+    return _Stated(terms, gauss_markov_of(found, model), pair, float(model.spectrum.frequency_hz[0]), scale, worst)
 
 
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:

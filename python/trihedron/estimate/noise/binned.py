@@ -1,4 +1,4 @@
-"""The spectrum in narrow bins, its most likely noise terms, and a Gauss-Markov process where they do not suffice."""
+"""The spectrum in narrow bins, its most likely noise terms, and a Gauss-Markov process where they may not suffice."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.channel_facts.low_pass import RISE
 from trihedron.errors import InputError
+from trihedron.estimate.noise.slow_changes import PLAUSIBLE
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates, gauss_markov_density
 from trihedron.records.noise import LEAST_S
 
 EVIDENCE = 8.0
-"""Penalty of a parameter in the choice between B, K and a Gauss-Markov process (size and time). An absent term reaches
+"""Cost of a parameter in the choice between B, K and a Gauss-Markov process (size and time). An absent term reaches
 it with a probability of 0.25 % (half a chi-square with one degree of freedom)."""
 SLOW_TERMS = (2, 3)
 """The terms that the process may replace: B and K."""
@@ -31,7 +33,7 @@ BIN_WIDTH = 1.025
 @dataclass(frozen=True, eq=False)
 class BinnedSpectrum:
     """Ordinates averaged over narrow bins: all (b,), ``basis`` (terms, b), ``cross`` (c, b) and ``square`` (c, c, b) of
-    the columns of slow changes, the line first."""
+    the columns, the line first, then those of slow changes."""
 
     frequency_hz: FloatArray
     count: FloatArray
@@ -109,14 +111,16 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A spectrum with its terms and, where they do not suffice, a Gauss-Markov process as the last.
+    """A spectrum with its terms and, perhaps, a Gauss-Markov process as the last.
 
-    ``evidence`` is what the process reduces the deviance by beyond the slow terms that it replaces.
+    ``evidence`` is what the process reduces the deviance by beyond the slow terms that it replaces, ``reach`` the
+    interval of its standard deviation over all its likely correlation times.
     """
 
     spectrum: BinnedSpectrum
     correlation_time_s: float | None = None
     evidence: float = 0.0
+    reach: tuple[float, float] = (0.0, 0.0)
 
     def power(self, band: Ordinates, step_s: float) -> FloatArray:
         """(k,) expected power of every ordinate of ``band``; readings are ``step_s`` apart."""
@@ -127,14 +131,14 @@ class Model:
         return np.asarray(out)
 
 
-def model_of(
+def models_of(
     bands: Sequence[Ordinates],
     highest_hz: float,
     masked: Sequence[BoolArray] | None = None,
     *,
     tolerance: float = 0.0,
-) -> Model:
-    """The model of the ordinates up to ``highest_hz`` that are not ``masked``.
+) -> list[Model]:
+    """The models of the ordinates up to ``highest_hz`` that are not ``masked``, the one that is stated first.
 
     Raises ``InputError`` when the channel does not change, or no ordinate of the spectrum remains.
     """
@@ -145,7 +149,7 @@ def model_of(
         spectrum = binned(bands, highest_hz, both)
     if tolerance > 0.0:
         spectrum = spectrum.capped(tolerance)
-    return _with_gauss_markov(min(band.step_s / band.block for band in bands), spectrum)
+    return _models(min(band.step_s / band.block for band in bands), spectrum)
 
 
 def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[BoolArray]:
@@ -161,13 +165,15 @@ def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[Boo
     return out
 
 
-def _with_gauss_markov(step_s: float, spectrum: BinnedSpectrum) -> Model:
+def _models(step_s: float, spectrum: BinnedSpectrum) -> list[Model]:
+    """The spectrum without a Gauss-Markov process, with one, or both where either may be."""
     # Filters change a spectrum by a few per cent: a process must be significant beyond this tolerance.
     capped, frequency = spectrum.capped(TOLERANCE_GAUSS_MARKOV), spectrum.frequency_hz
     # With a shorter time constant the process is white in this log, with a longer one a random walk.
     shortest, longest = 1.0 / (2 * np.pi * frequency[-1]), 1.0 / (2 * np.pi * frequency[0])
+    without = Model(spectrum)
     if not longest > 64 * shortest:
-        return Model(spectrum)
+        return [without]
 
     n_terms = range(len(SYMBOLS))
     models = [[k for k in n_terms if k not in dropped] for dropped in ((), *((k,) for k in SLOW_TERMS), SLOW_TERMS)]
@@ -177,16 +183,23 @@ def _with_gauss_markov(step_s: float, spectrum: BinnedSpectrum) -> Model:
 
     plain = least(capped.likelihood)
 
-    def gain(time_s: float) -> float:
-        return plain - least(capped.with_gauss_markov(step_s, time_s).likelihood, (len(SYMBOLS),))
+    def gains(times_s: FloatArray) -> FloatArray:
+        beside = [capped.with_gauss_markov(step_s, time_s).likelihood for time_s in times_s]
+        return plain - np.array([least(likelihood, (len(SYMBOLS),)) for likelihood in beside])
 
     # A corner in the uppermost three octaves is that of a filter, not of a process of the sensor.
     grid = np.geomspace(8 * shortest, longest / 2, max(4, int(np.log2(longest / shortest)) - 3))
-    best = max(grid, key=gain)
-    if gain(best) < EVIDENCE:
-        return Model(spectrum)
-    step = grid[1] / grid[0]
-    best = float(max(np.geomspace(max(best / step, grid[0]), best * step, 17), key=gain))
-    if gain(best) < 2.0 * EVIDENCE:
-        return Model(spectrum)
-    return Model(spectrum.with_gauss_markov(step_s, best), best, gain(best))
+    coarse = gains(grid)
+    if coarse.max() < EVIDENCE:
+        return [without]
+    best, step = grid[coarse.argmax()], grid[1] / grid[0]
+    times = np.geomspace(max(best / step, grid[0]), best * step, 17)
+    gain = gains(times)
+    most = float(gain.max())
+    if most < 2.0 * PLAUSIBLE:
+        return [without]
+    at = [spectrum.with_gauss_markov(step_s, time_s) for time_s in times]
+    sizes = [np.sqrt(one.fit.strength[-1]) for one, own in zip(at, gain, strict=True) if own > most - RISE]
+    k = int(gain.argmax())
+    process = Model(at[k], float(times[k]), most, (min(sizes), max(sizes)))
+    return [process] if most >= 2.0 * EVIDENCE else [without, process]

@@ -27,7 +27,14 @@ from trihedron.estimate.noise.screening import (
     tail_error,
     turn_of_gravity,
 )
-from trihedron.estimate.noise.slow_changes import MOSTLY, SlowChange, choices_of, share_of_temperature, slow_changes
+from trihedron.estimate.noise.slow_changes import (
+    MOSTLY,
+    SlowChange,
+    beside_each,
+    share_of_temperature,
+    slow_changes,
+    without,
+)
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.estimate.noise.two_levels import TwoLevels, two_levels
 from trihedron.ranges import merged
@@ -166,13 +173,13 @@ class _Undisturbed:
 
 @dataclass(frozen=True, eq=False)
 class _Screened:
-    """One channel with excluded intervals as NaN, the ``steps`` of its level, its slow ``changes``, and the share of
-    these that the temperature explains."""
+    """One channel with excluded intervals as NaN, the ``steps`` of its level, the ``choices`` of its slow changes, of
+    which the first are subtracted, and the share of these that the temperature explains."""
 
     column: FloatArray
     blank: NoiseAxis
     steps: list[Event]
-    changes: list[SlowChange]
+    choices: list[Sequence[SlowChange]]
     share_of_heat: float
 
     @property
@@ -215,11 +222,10 @@ def _without_events(column: FloatArray, rate_hz: float, unit: str) -> _Undisturb
 def sudden_changes(column: FloatArray, rate_hz: float) -> tuple[list[Event], list[Event]]:
     """Steps and impacts of a channel, beside its slow changes where these explain some of them: what a bias does in its
     first minutes is far outside the spread of its later changes."""
-    whole = bridged(column)
-    events = steps_and_impacts(whole)
-    changes = slow_changes(column, rate_hz) if any(events) else []
+    events = steps_and_impacts(bridged(column))
+    changes = slow_changes(column, rate_hz)[0] if any(events) else ()
     if changes:
-        beside = steps_and_impacts(whole - total_of(changes, len(column), rate_hz))
+        beside = steps_and_impacts(bridged(without(column, changes, rate_hz)))
         events = min(events, beside, key=lambda found: tuple(map(len, found)))
     return events
 
@@ -231,29 +237,16 @@ def _screen(
     name, unit = named
     column, steps, findings = quiet.column, quiet.steps, quiet.findings
     share = 0.0 if heat is None else share_of_temperature(column, heat, [e.middle for e in steps])
-    changes: list[SlowChange] = []
+    choices: list[Sequence[SlowChange]] = [()]
     if automatic and share <= MOSTLY:
-        changes, said = without_slow_changes(column, rate_hz, steps, unit, heat)
-        findings += said
+        choices = slow_changes(column, rate_hz, [e.middle for e in steps])
+        column = without(column, choices[0], rate_hz)
+        findings = [*findings, *remarks.changes(choices[0], unit, heat)]
     present = np.isfinite(column)
     n = int(np.count_nonzero(present))
     mean = float(np.sum(column, where=present)) / max(n, 1)
     blank = blank_axis(name, unit, rate_hz, n, mean, readout(column))
-    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), steps, changes, share)
-
-
-def without_slow_changes(
-    column: FloatArray, rate_hz: float, steps: Sequence[Event], unit: str, heat: FloatArray | None
-) -> tuple[list[SlowChange], list[Finding]]:
-    """Slow changes of the ``column`` (n,), from which the certain ones are subtracted in place, and their findings."""
-    changes = slow_changes(column, rate_hz, [e.middle for e in steps])
-    column -= total_of(changes, len(column), rate_hz)
-    return changes, list(remarks.changes(changes, unit, heat))
-
-
-def total_of(changes: Sequence[SlowChange], n: int, rate_hz: float) -> FloatArray:
-    """(n,) sum of those ``changes`` at every reading that are certain."""
-    return sum((change.at(np.arange(n) / rate_hz) for change in changes if change.is_certain), np.zeros(n))
+    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), steps, choices, share)
 
 
 def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
@@ -303,7 +296,8 @@ def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCu
     if seen.blank.sample_sigma == 0.0:
         return seen.blank
     stretches, rate_hz = stretches_between(len(seen.column), seen.steps), seen.blank.rate_hz
-    choices = [ordinates(seen.column, rate_hz, stretches, changes) for changes in choices_of(seen.changes)]
+    beside = beside_each(seen.column, seen.choices, rate_hz)
+    choices = [ordinates(x, rate_hz, stretches, changes) for x, changes in beside]
     axis = identify_axis(choices, seen.blank, curve, channel, tail_error(seen.column), range_degc)
     # Drift that the temperature explains is stated with it.
     others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)

@@ -81,7 +81,7 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
 def changes(found: Sequence[SlowChange], unit: str, heat: FloatArray | None = None) -> Iterator[Finding]:
     """Findings for the exponentials of a warm-up, beside the logged temperature ``heat``, and for waves."""
     low_degc, high_degc = UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))
-    for one in (change for change in found if change.is_certain):
+    for one in found:
         if one.is_wave:
             yield Finding.of(FindingCode.LOG_DRIFT, "wave", period_s=one.time_s, amplitude=one.size, unit=unit)
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -38,6 +38,8 @@ a wave) of a change for which intervals allow: with more it is as likely as none
 EARNED = 10.0
 """Least rise per parameter of a change that is stated and subtracted. Chance reaches it in 2e-6 of logs of white noise,
 1e-4 of walk and flicker, 9e-4 of Gauss-Markov noise (benches/static_screening.py)."""
+CONVERGED = 0.1
+"""Decrease of the deviance below which the times of changes are as likely as can be."""
 MOSTLY = 0.5
 """Share of a random walk's power beyond which temperature, not noise, is the larger part of it. Of 6000 axes of white
 noise, flicker, walk or ramp beside an independent temperature (walk, cycle or cooling) none reaches 0.41."""
@@ -45,22 +47,15 @@ noise, flicker, walk or ramp beside an independent temperature (walk, cycle or c
 
 @dataclass(frozen=True)
 class SlowChange:
-    """A change by ``weights`` of exp(-t/``time_s``), or of cosine and sine of period ``time_s``; ``rise`` is the
-    rise of twice the log-likelihood per parameter above noise and the other changes."""
+    """A change by ``weights`` of exp(-t/``time_s``), or of cosine and sine of period ``time_s``."""
 
     time_s: float
     weights: tuple[float, ...]
-    rise: float
 
     @property
     def is_wave(self) -> bool:
         """Whether it is periodic."""
         return len(self.weights) > 1
-
-    @property
-    def is_certain(self) -> bool:
-        """Whether it is stated and subtracted."""
-        return self.rise > EARNED
 
     @property
     def size(self) -> float:
@@ -84,42 +79,70 @@ def _shape(phase: FloatArray, *, is_wave: bool) -> FloatArray:
     return np.exp(-phase)[np.newaxis]
 
 
-def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) -> list[SlowChange]:
+def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) -> list[Sequence[SlowChange]]:
     """Exponentials and waves in readings ``x`` (n,), NaN where missing, that no Gaussian noise explains as well, beside
-    a straight line and a level on each side of the ``breaks`` (numbers of readings).
+    a straight line and a level on each side of the ``breaks`` (numbers of readings): those that are stated and, where
+    more are as likely as not, all of these.
 
     They are added one by one, each time the one that raises the likelihood most, with all their times fitted anew.
     """
     means = block_means(x, breaks=breaks)
     if means is None:
-        return []
-    times: list[tuple[float, bool]] = []
-    best, rises = means.beside(times), []
-    while len(times) < MOST:
-        tried = []
-        for is_wave, grid in ((False, TIMES), (True, 1.0 / CYCLES)):
-            deviance, time = min((means.beside([*times, (time, is_wave)], ())[0], time) for time in grid)
-            # Beside a change whose time is wrong the next one may show little.
-            if times or best[0] - deviance > PLAUSIBLE:
-                more = means.refined([*times, (float(time), is_wave)])
-                fit = means.beside(more)
-                tried.append(((best[0] - fit[0]) / (2 + is_wave), fit, more))
-        rise, fit, more = max(tried, key=lambda one: one[0], default=(0.0, best, times))
-        if rise <= PLAUSIBLE:
+        return [()]
+    found = [means.beside(())]
+    while len(found) <= MOST:
+        more = [means.refined(found[-1], is_wave=is_wave) for is_wave in (False, True)]
+        best = min(more, key=lambda one: one.cost(PLAUSIBLE))
+        if not best.cost(PLAUSIBLE) < found[-1].cost(PLAUSIBLE):
             break
-        best, times = fit, more
-        rises.append(rise)
-    left, out = best[1][1:], []
-    for (time, is_wave), rise in zip(times, rises, strict=True):
-        own, left = left[: 1 + is_wave], left[1 + is_wave :]
-        out.append(SlowChange(time * len(x) / rate_hz, tuple(own.tolist()), rise))
-    return out
+        found.append(best)
+    duration_s = len(x) / rate_hz
+    stated, plausible = min(found, key=lambda one: one.cost(EARNED)), found[-1]
+    return [one.changes(duration_s) for one in ((stated,) if stated is plausible else (stated, plausible))]
 
 
-def choices_of(changes: Sequence[SlowChange]) -> list[Sequence[SlowChange]]:
-    """The changes that are certain and, where there are others, which are as likely as not, all of them."""
-    certain = [change for change in changes if change.is_certain]
-    return [certain] if len(certain) == len(changes) else [certain, changes]
+def without(x: FloatArray, changes: Sequence[SlowChange], rate_hz: float) -> FloatArray:
+    """(n,) readings ``x`` (n,) less the ``changes``."""
+    t = np.arange(len(x)) / rate_hz
+    return x - sum((change.at(t) for change in changes), np.zeros(len(x))) if changes else x
+
+
+def beside_each(
+    x: FloatArray, choices: Sequence[Sequence[SlowChange]], rate_hz: float
+) -> Iterator[tuple[FloatArray, Sequence[SlowChange]]]:
+    """Readings without the changes of each choice, and these, from readings ``x`` (n,) without those of the first."""
+    first, *others = choices
+    yield x, first
+    for changes in others:
+        yield without(x, changes, rate_hz) + (x - without(x, first, rate_hz)), changes
+
+
+Time = tuple[float, bool]
+"""Time constant or period, in lengths of the log, and whether it is a wave's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Changes of these ``times`` beside the most likely noise: ``deviance``, ``sizes`` of a line and of the changes,
+    standard deviation ``sigma`` (m,) of every coefficient."""
+
+    times: tuple[Time, ...]
+    deviance: float
+    sizes: FloatArray
+    sigma: FloatArray
+
+    def cost(self, price: float) -> float:
+        """Deviance with ``price`` for every parameter."""
+        return self.deviance + price * sum(2 + is_wave for _, is_wave in self.times)
+
+    def changes(self, duration_s: float) -> list[SlowChange]:
+        """The changes of a log of ``duration_s``."""
+        ends = np.cumsum([1 + is_wave for _, is_wave in self.times])
+        sizes = np.split(self.sizes[1:], ends[:-1])
+        return [
+            SlowChange(time * duration_s, tuple(own.tolist()))
+            for (time, _), own in zip(self.times, sizes, strict=bool(self.times))
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,16 +184,19 @@ class Means:
         likelihood = _core.SpectralBins(np.ones(len(c)), c**2, c * X, X[:, np.newaxis] * X, noise)
         return likelihood.fit(range(len(noise)))
 
-    def beside(
-        self, times: Sequence[tuple[float, bool]], processes: Sequence[float] = CORRELATION
-    ) -> tuple[float, FloatArray]:
-        """Deviance beside the most likely noise, and the sizes of a line and of the changes of these ``times``."""
-        columns = np.vstack([self.t, *(self.shape(time, is_wave=is_wave) for time, is_wave in times)])
+    def beside(self, times: Sequence[Time]) -> Beside:
+        """Changes of these ``times`` beside the noise that is most likely then."""
         # Two exponentials of nearly one time are told apart by their difference.
-        across, size = np.linalg.qr(self.transformed(columns).T)
-        fits = [self.likely(across.T, noise) for noise in self.noises[: 1 + len(processes)]]
-        deviance, found = min((fit.deviance - fit.log_determinant, fit.columns) for fit in fits)
-        return deviance, np.linalg.lstsq(size, np.asarray(found), rcond=None)[0]
+        across, size = np.linalg.qr(self.columns(times).T)
+        fits = [(self.likely(across.T, noise), noise) for noise in self.noises]
+        fit, noise = min(fits, key=lambda one: one[0].deviance - one[0].log_determinant)
+        sizes = np.linalg.lstsq(size, np.asarray(fit.columns), rcond=None)[0]
+        deviance, sigma = fit.deviance - fit.log_determinant, np.sqrt(np.asarray(fit.strength) @ noise)
+        return Beside(tuple(times), deviance, sizes, sigma)
+
+    def columns(self, times: Sequence[Time]) -> FloatArray:
+        """(c, m) coefficients of a line and of changes of these ``times``."""
+        return self.transformed(np.vstack([self.t, *(self.shape(time, is_wave=is_wave) for time, is_wave in times)]))
 
     def shape(self, time: float, *, is_wave: bool) -> FloatArray:
         """(1 or 2, k) means of an exponential or a wave of ``time`` lengths."""
@@ -179,20 +205,46 @@ class Means:
         mean = np.sinc(2.0 * half) if is_wave else np.sinh(half) / half
         return np.asarray(mean * _shape(self.t / time, is_wave=is_wave))
 
-    def refined(self, times: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
-        """Times of the least deviance near the given ones, beside N, B and K."""
+    @cached_property
+    def tried(self) -> tuple[FloatArray, FloatArray]:
+        """(times, 1, m) and (times, 2, m) coefficients of exponentials of ``TIMES`` and waves of ``CYCLES``."""
+        exponentials = np.stack([self.shape(time, is_wave=False) for time in TIMES])
+        waves = np.stack([self.shape(1.0 / cycles, is_wave=True) for cycles in CYCLES])
+        return self.transformed(exponentials), self.transformed(waves)
+
+    def refined(self, known: Beside, *, is_wave: bool) -> Beside:
+        """The ``known`` changes and one more: first the best of those tried, beside the noise as it was, then all times
+        and the noise in turn while the deviance falls."""
+        across = np.linalg.qr((self.columns(known.times) / known.sigma).T)[0]
+        tried = self.tried[is_wave] / known.sigma
+        tried = np.linalg.qr(np.swapaxes(tried - tried @ across @ across.T, 1, 2))[0]
+        gain = np.sum((self.coefficients / known.sigma @ tried) ** 2, axis=1)
+        time = (1.0 / CYCLES if is_wave else TIMES)[gain.argmax()]
+        found = self.beside([*known.times, (float(time), is_wave)])
+        while True:
+            better = self.beside(self._times(found))
+            if better.deviance > found.deviance - CONVERGED:
+                return min(better, found, key=lambda one: one.deviance)
+            found = better
+
+    def _times(self, found: Beside) -> list[Time]:
+        """The most likely times near those ``found``, beside its noise."""
         # Imported here: commands that read a log start faster.
         from scipy.optimize import Bounds, minimize
 
-        kinds = [is_wave for _, is_wave in times]
+        kinds = [is_wave for _, is_wave in found.times]
         least = np.log(np.where(kinds, 1.0 / CYCLES[-1], TIMES[0])) - 0.1
         most = np.log(np.where(kinds, 1.0 / CYCLES[0], TIMES[-1])) + 0.1
         # Steps as those between the times that are tried.
-        start, step = np.log([time for time, _ in times]).clip(least, most), np.where(kinds, 0.01, 0.3)
+        start, step = np.log([time for time, _ in found.times]).clip(least, most), np.where(kinds, 0.01, 0.3)
         simplex = np.vstack([start, start + np.diag(np.where(start + step < most, step, -step))])
 
+        def times(logs: FloatArray) -> list[Time]:
+            return list(zip(np.exp(logs).tolist(), kinds, strict=True))
+
         def deviance(logs: FloatArray) -> float:
-            return self.beside(list(zip(np.exp(logs).tolist(), kinds, strict=True)), ())[0]
+            across = np.linalg.qr((self.columns(times(logs)) / found.sigma).T)[0]
+            return -float(np.sum((self.coefficients / found.sigma @ across) ** 2))
 
         best = minimize(
             deviance,
@@ -201,7 +253,7 @@ class Means:
             bounds=Bounds(least, most),
             options={"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-2},
         )
-        return list(zip(np.exp(best.x).tolist(), kinds, strict=True))
+        return times(best.x)
 
 
 def share_of_temperature(x: FloatArray, temperature: FloatArray, breaks: Sequence[float] = ()) -> float:

@@ -19,9 +19,9 @@ from trihedron.estimate.noise.allan import (
     default_clusters,
 )
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
-from trihedron.estimate.noise.identify import sudden_changes, without_slow_changes
+from trihedron.estimate.noise.identify import sudden_changes
 from trihedron.estimate.noise.screening import readout, tail_error
-from trihedron.estimate.noise.slow_changes import choices_of
+from trihedron.estimate.noise.slow_changes import beside_each, slow_changes, without
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
 from trihedron.records import AllanCurve, Noise, NoiseAxis
 
@@ -110,10 +110,13 @@ def _axis(stream: _core.AllanStream, channel: int, mean: float, head: FloatArray
     if blank.sample_sigma == 0.0:
         return blank
     means, size = stream.means(channel, -(-n // LONGEST_TRANSFORM))
-    steps, _ = sudden_changes(means, rate_hz / size)
-    changes, said = without_slow_changes(means, rate_hz / size, steps, unit, None)
-    events = remarks.events(steps, [], [], rate_hz / size, unit)
-    blank = replace(blank, findings=(*events, *said, *blank.findings))
+    rate_of_means = rate_hz / size
+    steps, _ = sudden_changes(means, rate_of_means)
+    choices = slow_changes(means, rate_of_means, [e.middle for e in steps])
+    means = without(means, choices[0], rate_of_means)
+    events = remarks.events(steps, [], [], rate_of_means, unit)
+    blank = replace(blank, findings=(*events, *remarks.changes(choices[0], unit), *blank.findings))
     stretches = stretches_between(len(means), steps)
-    choices = [ordinates_of_means((means, rate_hz), size, stretches, head, some) for some in choices_of(changes)]
-    return identify_axis(choices, blank, curve, channel, tail_error(head))
+    beside = beside_each(means, choices, rate_of_means)
+    bands = [ordinates_of_means((x, rate_hz), size, stretches, head, changes) for x, changes in beside]
+    return identify_axis(bands, blank, curve, channel, tail_error(head))
