@@ -49,6 +49,7 @@ pub mod stillness;
 pub mod telegraph;
 pub mod time_errors;
 pub mod timestamps;
+pub mod two_levels;
 
 #[cfg(feature = "python")]
 mod python;

@@ -6,10 +6,12 @@ use pyo3::prelude::*;
 
 use super::arrays::{dmatrix, flat1, samples};
 use crate::telegraph::{self, Inside, Means};
+use crate::two_levels as levels;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(telegraph_inside, module)?)?;
-    module.add_function(wrap_pyfunction!(telegraph_levels, module)?)
+    module.add_function(wrap_pyfunction!(telegraph_levels, module)?)?;
+    module.add_function(wrap_pyfunction!(two_levels, module)?)
 }
 
 type Seen<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>, f64);
@@ -75,4 +77,24 @@ fn telegraph_levels<'py>(
     };
     let found = super::run(py, || telegraph::levels(&means, &inside))?;
     Ok(found.map(|(state, gain)| (state.to_pyarray(py), gain)))
+}
+
+/// Log-likelihood of values `(n,)` about two levels that switch, these levels, and whether each value `(n,)` is of the
+/// second; from a guess of the levels.
+#[pyfunction]
+fn two_levels<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f64>,
+    guess: [f64; 2],
+) -> PyResult<(f64, [f64; 2], Bound<'py, PyArray1<bool>>)> {
+    let flat = flat1(&values);
+    if flat.len() < 2 {
+        return Err(PyValueError::new_err("two levels need two values"));
+    }
+    let found = super::run(py, || Ok(levels::two_levels(&flat, guess)))?;
+    Ok((
+        found.log_likelihood,
+        found.levels,
+        found.is_second.to_pyarray(py),
+    ))
 }

@@ -59,7 +59,13 @@ fn evaluate(bins: &Bins, strength: &[f64]) -> Value {
     let along = |values: &[f64]| -> f64 { weight.iter().zip(values).map(|(w, x)| w * x).sum() };
     let plain: f64 = bins.count.iter().zip(&v).map(|(n, v)| n * v.ln()).sum();
     let cross = DVector::from_fn(q, |i, _| along(&bins.cross[i]));
-    let square = DMatrix::from_fn(q, q, |i, j| along(&bins.square[i * q + j]));
+    let mut square = DMatrix::zeros(q, q);
+    for i in 0..q {
+        for j in 0..=i {
+            square[(i, j)] = along(&bins.square[i * q + j]);
+        }
+    }
+    square.fill_upper_triangle_with_lower_triangle();
     let mut deviance = plain + along(&bins.power);
     let mut log_determinant = 0.0;
     let mut covariance = DMatrix::zeros(q, q);
@@ -101,9 +107,10 @@ fn residual(bins: &Bins, value: &Value) -> Vec<f64> {
     };
     for i in 0..q {
         add(-2.0 * value.columns[i], &bins.cross[i]);
-        for j in 0..q {
+        for j in 0..=i {
             let product = value.columns[i] * value.columns[j] + value.covariance[(i, j)];
-            add(product, &bins.square[i * q + j]);
+            let times = if i == j { 1.0 } else { 2.0 };
+            add(times * product, &bins.square[i * q + j]);
         }
     }
     out
@@ -220,7 +227,7 @@ pub fn fit(bins: &Bins, free: &[usize]) -> Result<Point> {
     bins.check().map(|()| best(bins, free))
 }
 
-/// The most likely strengths of `free` from several starts; strengths that are not free are zero.
+/// The most likely strengths of `free` from a guess of each; strengths that are not free are zero.
 pub(super) fn best(bins: &Bins, free: &[usize]) -> Point {
     let mut start = vec![0.0; bins.basis.len()];
     for &k in free {
