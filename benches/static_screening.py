@@ -16,8 +16,17 @@ N = 2048
 TERMS = {"white": {}, "walk": {"K": (0.03,) * 3}, "flicker": {"B": (0.5,) * 3}, "Gauss-Markov": {}}
 logs = int(sys.argv[1]) if len(sys.argv) > 1 else 500
 limits = {"slow change": slow_changes.EARNED, "two levels": two_levels.EARNED}
-slow_changes.PLAUSIBLE = two_levels.EARNED = -math.inf
-two_levels.FEWEST, slow_changes.MOST = 0, 1
+two_levels.EARNED, two_levels.FEWEST = -math.inf, 0
+
+
+def rise_of_change(x):
+    """The largest rise per parameter of a change above noise alone."""
+    means = slow_changes.block_means(x)
+    alone = means.beside(())
+    more = ((means.refined(alone, is_wave=is_wave), 2 + is_wave) for is_wave in (False, True))
+    return max((alone.deviance - one.deviance) / n for one, n in more)
+
+
 for noise, terms in TERMS.items():
     rise = {name: [] for name in limits}
     for seed in range(logs):
@@ -26,7 +35,7 @@ for noise, terms in TERMS.items():
             # Correlation times from 3 readings to half of the log.
             rng, decay = np.random.default_rng(seed), math.exp(-(10.0 ** (-3.0 + 2.5 * seed / logs)))
             x += 3.0 * lfilter([math.sqrt(1.0 - decay**2)], [1.0, -decay], rng.normal(size=N))
-        rise["slow change"].append(slow_changes.slow_changes(x, 1.0)[0].rise)
+        rise["slow change"].append(rise_of_change(x))
         rise["two levels"].append(two_levels.two_levels(x, 1.0).rise)
     for name, limit in limits.items():
         start = np.quantile(rise[name], 0.95)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -179,46 +179,22 @@ def _of_spectra(choices: Sequence[Sequence[Ordinates]], blank: NoiseAxis, tails:
     if highest < nyquist or math.isnan(at_nyquist):
         findings.append(remarks.coloured(highest, nyquist, at_nyquist))
     tails = math.hypot(tails, level_share(blank.sample_sigma, blank.resolution))
+    blank = replace(blank, lines=tuple(lines), highest_hz=float(highest), findings=(*blank.findings, *findings))
 
-    def stated(model: Model) -> _Stated:
-        return _stated(model, tails, is_filtered=highest < nyquist)
+    def stated(model: Model) -> NoiseAxis:
+        return _stated(model, blank, tails, is_filtered=highest < nyquist)
 
-    first, *rest = map(stated, likely)
+    axis, *others = map(stated, likely)
     # Beside changes that are only plausible no other process is, but one that is stated is kept where it may be.
-    rest += [stated(models(bands)[0 if first.gauss_markov is None else -1]) for bands in choices[1:]]
-    if first.worst is not None:
-        deviation, frequency_hz = first.worst
-        findings.append(Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=deviation, frequency_hz=frequency_hz))
-    terms = first.terms
-    for other in rest:
-        terms = {name: _either(term, other.terms[name]) for name, term in terms.items()}
-    return replace(
-        blank,
-        terms=MappingProxyType(terms),
-        gauss_markov=first.gauss_markov,
-        slow_pair=first.pair,
-        lines=tuple(lines),
-        lowest_hz=first.lowest_hz,
-        highest_hz=float(highest),
-        covariance_scale=first.scale,
-        findings=(*blank.findings, *findings),
-    )
+    others += [stated(models(bands)[0 if axis.gauss_markov is None else -1]) for bands in choices[1:]]
+    for other in others:
+        terms = {name: _either(term, other.terms[name]) for name, term in axis.terms.items()}
+        axis = replace(axis, terms=MappingProxyType(terms))
+    return axis
 
 
-@dataclass(frozen=True)
-class _Stated:
-    """Statements about one model; ``scale`` is the largest factor on a variance, ``worst`` the deviation (share, Hz) of
-    a half octave that the terms do not explain."""
-
-    terms: dict[TermName, NoiseTerm]
-    gauss_markov: GaussMarkov | None
-    pair: SlowPair
-    lowest_hz: float
-    scale: float
-    worst: tuple[float, float] | None
-
-
-def _stated(model: Model, tails: float, *, is_filtered: bool) -> _Stated:
+def _stated(model: Model, blank: NoiseAxis, tails: float, *, is_filtered: bool) -> NoiseAxis:
+    """``blank`` with the terms of one model."""
     model, bend = straightened(model) if is_filtered else (model, 0.0)
     model, scale, worst = _tempered(model)
     found = model.spectrum.likelihood.invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
@@ -227,7 +203,19 @@ def _stated(model: Model, tails: float, *, is_filtered: bool) -> _Stated:
     terms = terms_of(found, pair)
     white = terms[TermName.WHITE]
     terms[TermName.WHITE] = widened(white, math.hypot(bend, tails) * white.estimate)
-    return _Stated(terms, gauss_markov_of(found, model), pair, float(model.spectrum.frequency_hz[0]), scale, worst)
+    findings = blank.findings
+    if worst is not None:
+        code = FindingCode.SPECTRUM_UNEXPLAINED
+        findings = (*findings, Finding.of(code, deviation=worst[0], frequency_hz=worst[1]))
+    return replace(
+        blank,
+        terms=MappingProxyType(terms),
+        gauss_markov=gauss_markov_of(found, model),
+        slow_pair=pair,
+        lowest_hz=float(model.spectrum.frequency_hz[0]),
+        covariance_scale=scale,
+        findings=findings,
+    )
 
 
 def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:

@@ -217,10 +217,11 @@ def tail_error(x: FloatArray) -> float:
     """
     change = np.diff(x)
     change = change[np.isfinite(change)]
-    square = float(np.mean(np.square(change))) if len(change) else 0.0
-    if square == 0.0:
+    square = np.square(change)
+    mean = float(square.mean()) if len(change) else 0.0
+    if mean == 0.0:
         return 0.0
-    excess = 2.0 * (float(np.mean(change**4)) / square**2 - 3.0)
+    excess = 2.0 * (float(square @ square) / len(change) / mean**2 - 3.0)
     return 0.5 * math.sqrt(max(excess, 0.0) / len(change))
 
 
