@@ -178,28 +178,29 @@ def _models(step_s: float, spectrum: BinnedSpectrum) -> list[Model]:
     n_terms = range(len(SYMBOLS))
     models = [[k for k in n_terms if k not in dropped] for dropped in ((), *((k,) for k in SLOW_TERMS), SLOW_TERMS)]
 
-    def least(likelihood: _core.SpectralBins, process: Sequence[int] = ()) -> float:
-        return min(likelihood.fit([*active, *process]).deviance + EVIDENCE * len(active) for active in models)
+    def deviances(likelihood: _core.SpectralBins, process: Sequence[int] = ()) -> FloatArray:
+        return np.array([likelihood.fit([*active, *process]).deviance for active in models])
 
-    plain = least(capped.likelihood)
+    plain, n_active = deviances(capped.likelihood), np.array([len(active) for active in models])
 
-    def gains(times_s: FloatArray) -> FloatArray:
-        beside = [capped.with_gauss_markov(step_s, time_s).likelihood for time_s in times_s]
-        return plain - np.array([least(likelihood, (len(SYMBOLS),)) for likelihood in beside])
+    def gains(times_s: FloatArray, prices: Sequence[float] = (EVIDENCE,)) -> FloatArray:
+        """(prices, times) decrease of the deviance by a process beyond that of terms at each price."""
+        beside = [deviances(capped.with_gauss_markov(step_s, time_s).likelihood, (len(SYMBOLS),)) for time_s in times_s]
+        costs = np.multiply.outer(prices, n_active)[:, np.newaxis]
+        return np.asarray((plain + costs).min(axis=2) - (np.array(beside) + costs).min(axis=2))
 
     # A corner in the uppermost three octaves is that of a filter, not of a process of the sensor.
     grid = np.geomspace(8 * shortest, longest / 2, max(4, int(np.log2(longest / shortest)) - 3))
-    coarse = gains(grid)
+    coarse = gains(grid)[0]
     if coarse.max() < EVIDENCE:
         return [without]
     best, step = grid[coarse.argmax()], grid[1] / grid[0]
     times = np.geomspace(max(best / step, grid[0]), best * step, 17)
-    gain = gains(times)
-    most = float(gain.max())
-    if most < 2.0 * PLAUSIBLE:
+    gain, likely = gains(times, (EVIDENCE, PLAUSIBLE))
+    most, k = float(gain.max()), int(gain.argmax())
+    if most < 2.0 * EVIDENCE and likely.max() < 2.0 * PLAUSIBLE:
         return [without]
     at = [spectrum.with_gauss_markov(step_s, time_s) for time_s in times]
     sizes = [np.sqrt(one.fit.strength[-1]) for one, own in zip(at, gain, strict=True) if own > most - RISE]
-    k = int(gain.argmax())
     process = Model(at[k], float(times[k]), most, (min(sizes), max(sizes)))
     return [process] if most >= 2.0 * EVIDENCE else [without, process]
