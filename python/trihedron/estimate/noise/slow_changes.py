@@ -121,6 +121,12 @@ Time = tuple[float, bool]
 """Time constant or period, in lengths of the log, and whether it is a wave's."""
 
 
+def _are_apart(times: Sequence[Time]) -> bool:
+    """Whether time constants differ by as much as those tried: nearer ones have sizes of any amount, and opposite."""
+    constants = sorted(time for time, is_wave in times if not is_wave)
+    return all(later >= TIMES[1] / TIMES[0] * time for time, later in pairwise(constants))
+
+
 @dataclass(frozen=True, eq=False)
 class Beside:
     """Changes of these ``times`` beside the most likely noise: ``deviance``, ``sizes`` of a line and of the changes,
@@ -219,8 +225,8 @@ class Means:
         tried = self.tried[is_wave] / known.sigma
         tried = np.linalg.qr(np.swapaxes(tried - tried @ across @ across.T, 1, 2))[0]
         gain = np.sum((self.coefficients / known.sigma @ tried) ** 2, axis=1)
-        time = (1.0 / CYCLES if is_wave else TIMES)[gain.argmax()]
-        found = self.beside([*known.times, (float(time), is_wave)])
+        more = [[*known.times, (float(time), is_wave)] for time in (1.0 / CYCLES if is_wave else TIMES)]
+        found = self.beside(more[int(np.argmax(gain * [_are_apart(times) for times in more]))])
         while True:
             better = self.beside(self._times(found))
             if better.deviance > found.deviance - CONVERGED:
@@ -243,6 +249,8 @@ class Means:
             return list(zip(np.exp(logs).tolist(), kinds, strict=True))
 
         def deviance(logs: FloatArray) -> float:
+            if not _are_apart(times(logs)):
+                return 0.0
             across = np.linalg.qr((self.columns(times(logs)) / found.sigma).T)[0]
             return -float(np.sum((self.coefficients / found.sigma @ across) ** 2))
 
