@@ -60,15 +60,36 @@ def test_the_terms_present_are_found(truth):
     assert sum(f == set(truth) for f in found) >= 4, found  # at 95 % each: a probability of 0.998
 
 
+def with_process(rng, n, rate_hz, tau_s, sigma, white):
+    """(n,) readings of a Gauss-Markov process beside white noise."""
+    decay = np.exp(-1.0 / (rate_hz * tau_s))
+    drive = sigma * np.sqrt(1 - decay**2) * rng.normal(size=n)
+    process, _ = lfilter([1.0], [1.0, -decay], drive, zi=[decay * sigma * rng.normal()])
+    return in_time(rng, n, rate_hz, N=white) + process
+
+
 def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
-    rng = np.random.default_rng(25)
-    n, tau, sigma = 1 << 17, 10.0, 5e-3
-    decay = np.exp(-1.0 / (RATE * tau))
-    process = lfilter([sigma * np.sqrt(1 - decay**2)], [1.0, -decay], rng.normal(size=n))
-    axis = identify_noise(in_time(rng, n, RATE, N=2e-3) + process, RATE).axes[0]
+    x = with_process(np.random.default_rng(25), 1 << 17, RATE, 10.0, 5e-3, 2e-3)
+    axis = identify_noise(x, RATE).axes[0]
     assert present(axis) == {"N", "G"}
     assert 4.0 < axis.gauss_markov.correlation_time_s < 25.0
-    assert axis.gauss_markov.sigma_process == pytest.approx(sigma, rel=0.25)
+    assert axis.gauss_markov.sigma_process == pytest.approx(5e-3, rel=0.25)
+
+
+def test_a_gauss_markov_process_beside_a_warm_up_is_named_and_its_interval_holds():
+    rng, inside, named = np.random.default_rng(27), 0, 0
+    t = np.arange(36_000) / 10.0
+    for _ in range(12):
+        x = with_process(rng, len(t), 10.0, 20.0, 1.0, 1.0) + 30.0 * np.exp(-t / 400.0)
+        axis = identify_noise(x, 10.0).axes[0]
+        (warm_up,) = [f.numbers["time_s"] for f in axis.findings if "time_s" in f.numbers]
+        assert warm_up == pytest.approx(400.0, rel=0.2)
+        named += present(axis) == {"N", "G"}
+        process = axis.gauss_markov
+        inside += process is not None and process.lower <= 1.0 <= process.upper
+    # At 95 % each: ten of twelve or more have a probability of 0.98.
+    assert named >= 10
+    assert inside >= 10
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +187,15 @@ def test_a_warm_up_hundreds_of_times_the_noise_leaves_no_walk(times_s):
     found = sorted((one.time_s, one.size) for one in slow_changes(x, 10.0)[0])
     assert found == [pytest.approx((time_s, 100.0), rel=3e-3) for time_s in times_s]
     assert present(identify_noise(x, 10.0).axes[0]) == {"N"}
+
+
+def test_two_exponentials_of_nearly_one_time_have_no_sizes_beyond_what_they_explain():
+    t = np.arange(36_000) / 10.0
+    hump = 30.0 * np.exp(1.0) * t / 300.0 * np.exp(-t / 300.0)
+    (found, *_) = slow_changes(hump + np.random.default_rng(4).normal(size=len(t)), 10.0)
+    short, long = sorted(one.time_s for one in found if not one.is_wave)[:2]
+    assert long > 1.3 * short
+    assert max(one.size for one in found) < 20.0 * 30.0
 
 
 def test_a_log_too_short_for_what_its_filter_leaves_is_refused_with_a_length():
