@@ -68,17 +68,19 @@ def rounded_angle(rng, rate, h, Q):
 
 
 def trial(seed, n, rate_hz, mix, runs):
-    """(runs, 5) whether the interval holds the truth, whether the term is named; relative errors; seconds a run."""
+    """(runs, 5) whether the interval holds the truth, (runs, 6) what is named, last B and K as a pair; relative errors;
+    seconds a run."""
     rng = np.random.default_rng(seed)
     truth = dict(mix)
     if "Q" in truth:
         truth["Q"] *= truth["N"] / np.sqrt(rate_hz)
     inside, named, errors, began = [], [], {s: [] for s in "NBK" if s in truth}, time.perf_counter()
     for _ in range(runs):
-        terms = identify_noise(in_time(rng, n, rate_hz, **truth), rate_hz).axes[0].terms
+        axis = identify_noise(in_time(rng, n, rate_hz, **truth), rate_hz).axes[0]
+        terms = axis.terms
         found = [terms[TermName(s)] for s in TERMS]
         inside.append([t.lower <= truth.get(s, 0.0) <= t.upper for s, t in zip(TERMS, found, strict=True)])
-        named.append([t.is_present for t in found])
+        named.append([*(t.is_present for t in found), axis.slow_pair.is_present])
         for s, kept in errors.items():
             term = terms[TermName(s)]
             kept.append(getattr(term, "estimate", term.value) / truth[s] - 1.0)
@@ -92,14 +94,14 @@ def main(runs=200):
         for j, mix in enumerate(MIXES):
             inside, named, errors, seconds = trial(1000 + 10 * i + j, n, rate_hz, mix, runs)
             cells.append(inside.mean(axis=0))
-            false.append(named[:, [s not in mix for s in TERMS]].any(axis=1).mean())
+            false.append(named[:, [*(s not in mix for s in TERMS), False]].any(axis=1).mean())
             said = " ".join(
                 f"{s} {100 * a:5.1f} ({100 * b:.0f})"
-                for s, a, b in zip(TERMS, cells[-1], named.mean(axis=0), strict=True)
+                for s, a, b in zip(TERMS, cells[-1], named.mean(axis=0)[:-1], strict=True)
             )
             rms = " ".join(f"{s} {np.sqrt(np.mean(np.square(e))):.3f}" for s, e in errors.items())
-            print(f"{n / rate_hz / 60:4.0f} min {''.join(mix):5s} {said} | false name {100 * false[-1]:4.1f} % "
-                  f"| rms {rms} | {1e3 * seconds:.0f} ms", flush=True)  # fmt: skip
+            print(f"{n / rate_hz / 60:4.0f} min {''.join(mix):5s} {said} | pair {100 * named[:, -1].mean():3.0f} | "
+                  f"false name {100 * false[-1]:4.1f} % | rms {rms} | {1e3 * seconds:.0f} ms", flush=True)  # fmt: skip
     for k, s in enumerate(TERMS):
         rates = 100 * np.array(cells)[:, k]
         print(f"{s}: least {rates.min():.1f}, mean {rates.mean():.1f}, most {rates.max():.1f} %")

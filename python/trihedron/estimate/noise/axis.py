@@ -134,32 +134,11 @@ def identify_axis(
 ) -> NoiseAxis:
     """``blank`` with the terms of its spectrum, its lines, and findings.
 
-    ``choices`` are the bands beside equally likely slow changes. ``tails`` is the part of N's relative standard error
-    due to non-Gaussian tails, which a spectrum does not show; ``range_degc`` is that of the logged temperature.
+    ``choices`` are the bands beside equally likely slow changes: intervals reach over all models of these, and what is
+    not needed in each is not named. ``tails`` is the part of N's relative standard error due to non-Gaussian tails,
+    which a spectrum does not show; ``range_degc`` is that of the logged temperature.
     """
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
-    blank = replace(blank, longest_tau_s=float(usable[-1]) if len(usable) else 0.0)
-    axis = _of_spectra(choices, blank, tails)
-    return replace(axis, findings=(*axis.findings, *remarks.about_terms(axis, range_degc)))
-
-
-def _either(one: NoiseTerm, other: NoiseTerm) -> NoiseTerm:
-    """A term with the interval of both statements, named where both name it."""
-    is_present, upper = one.is_present and other.is_present, max(one.upper, other.upper)
-    return replace(
-        one,
-        is_present=is_present,
-        value=one.value if is_present else 0.0,
-        sigma=max(one.sigma, other.sigma) if is_present else 0.0,
-        lower=min(one.lower, other.lower),
-        upper=upper,
-        limit=upper,
-        evidence=min(one.evidence, other.evidence),
-    )
-
-
-def _of_spectra(choices: Sequence[Sequence[Ordinates]], blank: NoiseAxis, tails: float) -> NoiseAxis:
-    """The axis by all models of all ``choices``: intervals reach over them, what is not needed in each is not named."""
     bands = choices[0]
     # With scattered losses and slow noise only block means are used: their spectrum ends below Nyquist.
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
@@ -179,18 +158,41 @@ def _of_spectra(choices: Sequence[Sequence[Ordinates]], blank: NoiseAxis, tails:
     if highest < nyquist or math.isnan(at_nyquist):
         findings.append(remarks.coloured(highest, nyquist, at_nyquist))
     tails = math.hypot(tails, level_share(blank.sample_sigma, blank.resolution))
-    blank = replace(blank, lines=tuple(lines), highest_hz=float(highest), findings=(*blank.findings, *findings))
+    blank = replace(
+        blank,
+        longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
+        lines=tuple(lines),
+        highest_hz=float(highest),
+        findings=(*blank.findings, *findings),
+    )
 
     def stated(model: Model) -> NoiseAxis:
         return _stated(model, blank, tails, is_filtered=highest < nyquist)
 
     axis, *others = map(stated, likely)
     # Beside changes that are only plausible no other process is, but one that is stated is kept where it may be.
-    others += [stated(models(bands)[0 if axis.gauss_markov is None else -1]) for bands in choices[1:]]
-    for other in others:
+    beside = [stated(models(bands)[0 if axis.gauss_markov is None else -1]) for bands in choices[1:]]
+    for other in (*others, *beside):
         terms = {name: _either(term, other.terms[name]) for name, term in axis.terms.items()}
         axis = replace(axis, terms=MappingProxyType(terms))
-    return axis
+    for other in beside:
+        axis = replace(axis, slow_pair=min(axis.slow_pair, other.slow_pair, key=lambda pair: pair.evidence))
+    return replace(axis, findings=(*axis.findings, *remarks.about_terms(axis, range_degc)))
+
+
+def _either(one: NoiseTerm, other: NoiseTerm) -> NoiseTerm:
+    """A term with the interval of both statements, named where both name it."""
+    is_present, upper = one.is_present and other.is_present, max(one.upper, other.upper)
+    return replace(
+        one,
+        is_present=is_present,
+        value=one.value if is_present else 0.0,
+        sigma=max(one.sigma, other.sigma) if is_present else 0.0,
+        lower=min(one.lower, other.lower),
+        upper=upper,
+        limit=upper,
+        evidence=min(one.evidence, other.evidence),
+    )
 
 
 def _stated(model: Model, blank: NoiseAxis, tails: float, *, is_filtered: bool) -> NoiseAxis:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -57,8 +57,6 @@ LONGEST_TRANSFORM = 1 << 17
 SEGMENT = 1 << 14
 MOST_SEGMENTS = 64
 """Segments used for the high band of one log: a million readings determine white noise to 0.07 %."""
-SAME = 1e-9
-"""Share of the columns' mean square below which a combination of them is none: two changes of nearly one time."""
 USED_SHARE = 8
 """The lowest 1/8 of the spectrum of block means is used: aliasing by the averaging is below 1 % there."""
 
@@ -148,7 +146,7 @@ def ordinates(
             f"no stretch of the log is long enough to separate noise terms: the longest has "
             f"{max((b - a for a, b in stretches), default=0)} readings; record longer or exclude less"
         )
-    return _apart(bands)
+    return bands
 
 
 def ordinates_of_means(
@@ -167,20 +165,7 @@ def ordinates_of_means(
     bands = [_whole(Run(a, means[a:b], 0.0, 0.0), step_s, block, (0.0, changes)) for a, b in stretches if b - a >= 32]
     if block > 1:
         bands += _segments(head, rate_hz, [(0, len(head))], block, _n_columns(changes))
-    return _apart(bands)
-
-
-def _apart(bands: Sequence[Ordinates]) -> list[Ordinates]:
-    """The bands with columns that differ: the line, and combinations of the others."""
-    products = np.sum([band.columns @ band.columns.T for band in bands], axis=0)
-    scale = np.sqrt(np.diag(products))
-    value, vector = np.linalg.eigh((products / np.outer(scale, scale))[1:, 1:])
-    own = vector[:, value > SAME].T / scale[1:]
-
-    def few(rows: FloatArray) -> FloatArray:
-        return np.vstack([rows[:1], own @ rows[1:]])
-
-    return [replace(band, cross=few(band.cross), columns=few(band.columns)) for band in bands]
+    return bands
 
 
 def _whole(
