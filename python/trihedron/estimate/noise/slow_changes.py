@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -143,12 +143,8 @@ class Beside:
 
     def changes(self, duration_s: float) -> list[SlowChange]:
         """The changes of a log of ``duration_s``."""
-        ends = np.cumsum([1 + is_wave for _, is_wave in self.times])
-        sizes = np.split(self.sizes[1:], ends[:-1])
-        return [
-            SlowChange(time * duration_s, tuple(own.tolist()))
-            for (time, _), own in zip(self.times, sizes, strict=bool(self.times))
-        ]
+        sizes = iter(self.sizes[1:].tolist())
+        return [SlowChange(time * duration_s, tuple(islice(sizes, 1 + is_wave))) for time, is_wave in self.times]
 
 
 @dataclass(frozen=True, eq=False)
