@@ -26,6 +26,7 @@ from itertools import combinations
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.estimate.noise.binned import EVIDENCE
 from trihedron.probability import NORMAL_95
 from trihedron.records.noise import TermName, allan_of_unit_terms
 
@@ -105,9 +106,6 @@ _RISE_95 = 3.841
 _RISE_95_ONE_SIDED = 2.706
 _CONVERGED = 3e-4
 """Step of a log square at convergence: a tenth of the standard error from a curve of millions of readings."""
-EVIDENCE = 8.0
-"""Penalty of a term: the least reduction of the deviance. An absent term reaches it with a probability of 0.25 % (half
-a chi-square with one degree of freedom; the ramp, which has two signs, 0.5 %): four absent terms together 1.5 %."""
 LEAST_EDF = 1.5
 """Fewest degrees of freedom of a point: with fewer it adds nothing to its neighbours."""
 

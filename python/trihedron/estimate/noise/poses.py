@@ -162,14 +162,12 @@ def _band_power(
     parts: Sequence[FloatArray], rate_hz: float, low_hz: float, high_hz: float
 ) -> tuple[FloatArray, FloatArray]:
     """(k,) mean power of each pose between two frequencies, and its number of ordinates; short poses are skipped."""
-    power, ordinates = [], []
+    bands = []
     for part in parts:
         first, last = (math.ceil(f * 2.0 * len(part) / rate_hz) for f in (low_hz, high_hz))
-        inside = cosine_transform(part - part.mean())[max(first, 1) : max(last, 2)] ** 2 / rate_hz
-        if len(inside):
-            power.append(float(inside.mean()))
-            ordinates.append(float(len(inside)))
-    return np.array(power), np.array(ordinates)
+        bands.append(cosine_transform(part - part.mean())[max(first, 1) : max(last, 2)] ** 2 / rate_hz)
+    bands = [band for band in bands if len(band)]
+    return np.array([band.mean() for band in bands]), np.array([float(len(band)) for band in bands])
 
 
 def _of_differences(axis: StaticAxis, rate_hz: float) -> Measured | None:
@@ -205,30 +203,21 @@ def _of_level(axis: StaticAxis, density: float, sigma_log: float, corner_hz: flo
 
 def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, ...]:
     """Mean power in octaves between powers of 2 Hz, over the poses with at least four ordinates in the octave."""
-    nyquist = rate_hz / 2.0
-    found: dict[int, tuple[list[float], list[float]]] = {}
-    for part in parts:
-        power = cosine_transform(part - part.mean())[1:] ** 2 / rate_hz
-        frequency = np.arange(1, len(part)) * rate_hz / (2.0 * len(part))
-        number = np.floor(np.log2(frequency)).astype(np.int64)
-        for octave in np.unique(number).tolist():
-            low = 2.0**octave
-            inside = number == octave
-            n = int(inside.sum())
-            # Whole octaves only, or the part below Nyquist where it is most of one.
-            if n < 4 or frequency[0] > low * 1.2 or nyquist < low * math.sqrt(2.0):
-                continue
-            means, dofs = found.setdefault(octave, ([], []))
-            means.append(float(power[inside].mean()))
-            dofs.append(float(n))
-    out = []
-    for octave in sorted(found):
+    nyquist, out = rate_hz / 2.0, []
+    lowest = rate_hz / (2.0 * max(len(part) for part in parts))
+    # Whole octaves only, or the part below Nyquist where it is most of one.
+    for octave in range(math.floor(math.log2(lowest)), math.floor(math.log2(nyquist / math.sqrt(2.0))) + 1):
+        low = 2.0**octave
+        whole = [part for part in parts if rate_hz / (2.0 * len(part)) <= 1.2 * low]
+        power, ordinates = _band_power(whole, rate_hz, low, 2.0 * low)
+        power, ordinates = power[ordinates >= 4], ordinates[ordinates >= 4]
         # A single long pose, perhaps still held by hand, does not determine the sensor's low octave.
-        if len(found[octave][0]) < min(FEWEST_POSES, len(parts)):
+        if len(power) < max(min(FEWEST_POSES, len(parts)), 1):
             continue
-        pooled = pooled_logarithm(np.array(found[octave][0]), np.array(found[octave][1]))
+        pooled = pooled_logarithm(power, ordinates)
         if pooled.sigma > 1.0 or not math.isfinite(pooled.mean):
             continue
-        density = as_measured(math.exp(pooled.mean), pooled.sigma, pooled.dof)
-        out.append(OctaveNoise(2.0**octave, min(2.0 ** (octave + 1), nyquist), density))
+        out.append(
+            OctaveNoise(low, min(2.0 * low, nyquist), as_measured(math.exp(pooled.mean), pooled.sigma, pooled.dof))
+        )
     return tuple(out)
