@@ -36,8 +36,8 @@ PLAUSIBLE = float(np.log(MEANS))
 """Least rise of twice the log-likelihood per parameter (size and time of an exponential; amplitude, phase and period of
 a wave) of a change for which intervals allow: with more it is as likely as none (Schwarz)."""
 EARNED = 10.0
-"""Least rise per parameter of a change that is stated and subtracted. Chance reaches it in 2e-6 of logs of white noise,
-1e-4 of walk and flicker, 9e-4 of Gauss-Markov noise (benches/static_screening.py)."""
+"""Least rise per parameter of a change that is stated and subtracted. Chance reaches it in 1e-5 of logs of white noise,
+1e-4 of Gauss-Markov noise, 4e-4 of flicker, 2e-3 of a walk (benches/static_screening.py)."""
 CONVERGED = 0.1
 """Decrease of the deviance below which the times of changes are as likely as can be."""
 MOSTLY = 0.5
