@@ -61,6 +61,8 @@ pub struct Beside {
 pub struct Marginal {
     /// Log-evidence against none.
     pub gain: f64,
+    /// The same of each shape.
+    pub of_shapes: [f64; N_SHAPES],
     /// Mean error.
     pub mean: DVector<f64>,
     /// Second moment of the errors.
@@ -94,23 +96,22 @@ impl Beside {
                 ));
             }
         }
-        let most = each
-            .iter()
-            .map(|one| one.0)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = each.iter().map(|one| (one.0 - most).exp()).sum();
         let mut out = Marginal {
-            gain: most + total.ln(),
+            gain: log_sum(each.iter().map(|one| one.0)),
+            of_shapes: [0.0; N_SHAPES],
             mean: DVector::zeros(n),
             second: DMatrix::zeros(n, n),
         };
         for shape in 0..N_SHAPES {
             let (mut mean, mut second) = (DVector::zeros(3), DMatrix::zeros(3, 3));
+            let mut share = 0.0;
             for (gain, _, at, variance) in each.iter().filter(|one| one.1 == 3 * shape) {
                 let weight = (gain - out.gain).exp();
+                share += weight;
                 mean += at * weight;
                 second += (variance + at * at.transpose()) * weight;
             }
+            out.of_shapes[shape] = out.gain + (share * N_SHAPES as f64).ln();
             let shift = self.shift.columns(3 * shape, 3);
             out.mean += shift * mean;
             out.second += shift * second * shift.transpose();
@@ -131,19 +132,28 @@ fn strengths() -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Second moment `(9, 9)` of the errors of a fit of lengths of gravity: relative errors of the lower triangle of S, row
-/// by row, and of b; from unit verticals, residuals of the lengths and their noise, in units of |g|. Biases may scatter
-/// from pose to pose by any amount, axes be nonlinear beside each (11.12b, 11.12c); `prior` is the standard deviation of the
-/// parameters beforehand, if any.
+/// Errors of a fit of lengths of gravity: of the lower triangle of S, relative, row by row, and of b in units of |g|.
+pub struct OfLengths {
+    /// Second moment `(9, 9)`.
+    pub second: DMatrix<f64>,
+    /// Log-odds of each shape of nonlinear axes against none.
+    pub log_odds: [f64; N_SHAPES],
+    /// Mean `(9)` beside nonlinear axes.
+    pub mean: DVector<f64>,
+}
+
+/// Errors of a fit of lengths of gravity from unit verticals, residuals of the lengths and their noise, in units of |g|.
+/// Biases may scatter from pose to pose by any amount, axes be nonlinear beside each (11.12b, 11.12c); `prior` is the
+/// standard deviation of the parameters beforehand, if any.
 ///
 /// # Errors
 /// When the poses do not determine nine parameters.
-pub fn norm_fit_covariance(
+pub fn of_lengths(
     up: &[Vector3<f64>],
     residual: &[f64],
     sigma: &[f64],
     prior: Option<f64>,
-) -> Result<DMatrix<f64>> {
+) -> Result<OfLengths> {
     let design = DMatrix::from_fn(up.len(), 9, |i, c| match LOWER.get(c) {
         Some(&(j, k)) => up[i][j] * up[i][k],
         None => up[i][c - LOWER.len()],
@@ -155,7 +165,7 @@ pub fn norm_fit_covariance(
     let usual = median(&mut sigma.to_vec());
     let known = prior.map_or(0.0, |sigma| sigma.powi(-2));
     let mut at_fit = None;
-    let mut found = Vec::new();
+    let (mut found, mut plain) = (Vec::new(), Vec::new());
     for i in 0..N_SCATTERS {
         let scatter = match i {
             0 => 0.0,
@@ -169,9 +179,10 @@ pub fn norm_fit_covariance(
         let (x, b, r) = (by(&design), by(&bends), residual.component_mul(&white));
         let half = Cholesky::new(x.tr_mul(&x) + DMatrix::identity(9, 9) * known)
             .ok_or_else(|| Error::not_determined("the poses do not determine nine parameters"))?;
-        // At the noise of the fit this is balanced by the prior.
+        // At the noise of an anchored fit this is balanced by the prior.
         let pull = x.tr_mul(&r);
-        let pull = &pull - &*at_fit.get_or_insert_with(|| pull.clone());
+        let balanced = at_fit.get_or_insert_with(|| &pull * f64::from(u8::from(prior.is_some())));
+        let pull = &pull - &*balanced;
         let step = half.solve(&pull);
         let shift = -half.solve(&x.tr_mul(&b));
         let left = &b + &x * &shift;
@@ -194,23 +205,43 @@ pub fn norm_fit_covariance(
             + &step * step.transpose()
             + &cross
             + cross.transpose()
-            + with_bends.second;
-        found.push((beforehand + alone + with_bends.gain, second));
+            + &with_bends.second;
+        plain.push(beforehand + alone);
+        found.push((beforehand + alone + with_bends.gain, second, with_bends));
     }
-    Ok(by_evidence(&found))
+    let log_odds = std::array::from_fn(|shape| {
+        let each = plain.iter().zip(&found);
+        let beside = each.map(|(alone, (_, _, bends))| alone + bends.of_shapes[shape]);
+        log_sum(beside) - log_sum(plain.iter().copied())
+    });
+    let whole = log_sum(found.iter().map(|one| one.0));
+    let each = found.iter();
+    let mean = each
+        .map(|(log, _, bends)| &bends.mean * (log - whole).exp())
+        .sum();
+    let seconds: Vec<_> = found
+        .into_iter()
+        .map(|(log, second, _)| (log, second))
+        .collect();
+    Ok(OfLengths {
+        second: by_evidence(&seconds),
+        log_odds,
+        mean,
+    })
+}
+
+/// Logarithm of a sum, from the logarithms of its terms.
+fn log_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = terms.clone().fold(f64::NEG_INFINITY, f64::max);
+    most + terms.map(|term| (term - most).exp()).sum::<f64>().ln()
 }
 
 /// Mean of second moments, each with the logarithm of its evidence.
 #[must_use]
 pub fn by_evidence(found: &[(f64, DMatrix<f64>)]) -> DMatrix<f64> {
-    let most = found
-        .iter()
-        .map(|one| one.0)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let weight = |log: f64| (log - most).exp();
-    let total: f64 = found.iter().map(|one| weight(one.0)).sum();
+    let whole = log_sum(found.iter().map(|one| one.0));
     found
         .iter()
-        .map(|(log, second)| second * (weight(*log) / total))
+        .map(|(log, second)| second * (log - whole).exp())
         .sum()
 }

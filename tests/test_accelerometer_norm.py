@@ -7,8 +7,6 @@ import pytest
 from scipy.stats import binom
 
 from trihedron import _core, calibrate
-from trihedron.estimate.accelerometer import nonlinear_shapes
-from trihedron.estimate.accelerometer.nonlinear_shapes import SHAPES
 from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
 from trihedron.estimate.gravity_error import norm_error
@@ -25,6 +23,7 @@ SIGMA = np.array([0.35, 0.30, 0.42])  # counts: about 0.8 mm/s²
 GRAVITY = 9.81
 SCATTER, BENDS = 8e-3, 2e-2
 """m/s²: the first as a consumer's bias repeats, the second 0.2 % of |g|, as its data sheet has it."""
+SHAPES = {"quadratic": lambda u: u**3, "cubic": lambda u: u**4}
 EVERYWHERE = directions_of(np.random.default_rng(0).normal(size=(4000, 3)))
 AXES_OF = np.sum(np.abs(CANDIDATES) > 0.1, axis=1)
 
@@ -166,33 +165,30 @@ def drawn(rng, n):
     return directions_of(rng.normal(size=(n, 3))), rng.uniform(1e-3, 3e-3, n)
 
 
-def test_sound_poses_have_a_shape_as_often_as_chance_says(monkeypatch):
-    monkeypatch.setattr(nonlinear_shapes, "FALSE_ALARM", 0.05)
-    monkeypatch.setattr(nonlinear_shapes, "MATTERS", 0.0)
+def test_scatter_of_any_size_is_no_shape():
     rng, said, n_trials = np.random.default_rng(3), 0, 600
     for _ in range(n_trials):
         up, sigma = drawn(rng, int(rng.integers(16, 45)))
-        # Noise twice as large as stated: an F needs no size of it.
+        # Noise twice as large as stated.
         residual, _ = linear_fit(up, 2.0 * sigma * rng.normal(size=len(up)), sigma)
-        said += nonlinear_shapes.shape_of(up, residual, sigma, GRAVITY, 4.0) is not None
-    # Bonferroni over three shapes that are much alike: at most the stated rate.
+        _, odds, _ = _core.errors_of_lengths(up, residual / GRAVITY, sigma / GRAVITY)
+        said += max(odds) - np.log(3.0) > np.log(20.0)
+    # Odds of 20 are reached by chance once in 20 trials at most.
     assert said <= binom.ppf(0.999, n_trials, 0.05)
-    assert said >= binom.ppf(0.001, n_trials, 0.05 / 3.0)
 
 
-@pytest.mark.parametrize(("name", "power"), [("quadratic", 3), ("cubic", 4)])
-def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, power):
+@pytest.mark.parametrize(("name", "place"), [("quadratic", 0), ("cubic", 1)])
+def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, place):
     rng = np.random.default_rng(5)
     up, sigma = drawn(rng, 36)
     size = np.array([0.05, -0.03, 0.04])
-    bent = up**power @ size + sigma * rng.normal(size=len(up))
-    residual, found = linear_fit(up, bent, sigma)
-    _, clean = linear_fit(up, bent - up**power @ size, sigma)
-    shape = nonlinear_shapes.shape_of(up, residual, sigma, GRAVITY, 1.0)
-    assert shape is not None
-    assert shape.names[0] == name
-    assert shape.p < 1e-6
-    assert shape.shift_m_s2 == pytest.approx(GRAVITY * np.abs(found - clean).max(), rel=0.2)
+    residual, found = linear_fit(up, SHAPES[name](up) @ size + sigma * rng.normal(size=len(up)), sigma)
+    everywhere = np.linalg.lstsq(design_of(EVERYWHERE), SHAPES[name](EVERYWHERE) @ size)[0]
+    _, odds, shift = _core.errors_of_lengths(up, residual / GRAVITY, sigma / GRAVITY)
+    assert np.argmax(odds) == place
+    assert max(odds) > np.log(1e6)
+    # To the best linear approximation over all directions; noise of the poses leaves 5e-4.
+    assert np.abs(shift - (everywhere - found)).max() < 2e-3 < np.abs(everywhere - found).max() * 4.0
 
 
 def test_a_calibration_of_a_bent_accelerometer_is_not_to_be_trusted_and_a_sound_one_is():
@@ -205,7 +201,7 @@ def test_a_calibration_of_a_bent_accelerometer_is_not_to_be_trusted_and_a_sound_
         assert bool(said) == is_bent
         assert result.calibration.is_trustworthy != is_bent
         if said:
-            assert said[0].numbers["shift_sigma"] > 5.0  # no chance of the stated errors
+            assert said[0].numbers["log10_odds"] > 5.0
 
 
 @pytest.mark.parametrize(
@@ -225,7 +221,7 @@ def test_bars_hold_for_scatter_and_for_bending(name, n):
         white = design_of(up) / sigma[:, None]
         # Errors of the nine relative parameters by noise, and with scatter and nonlinear axes as parameters.
         before.append(found / np.sqrt(np.diag(np.linalg.inv(white.T @ white))))
-        covariance = _core.norm_fit_covariance(up, residual / GRAVITY, sigma / GRAVITY)
+        covariance = _core.errors_of_lengths(up, residual / GRAVITY, sigma / GRAVITY)[0]
         after.append(found / np.sqrt(np.diag(covariance)))
     # Nine parameters of one session go together: a session counts once, by the share of its nine.
     covered = float(np.mean(np.abs(after) < 1.96))
@@ -237,5 +233,5 @@ def test_bends_that_the_poses_do_not_see_are_as_large_as_a_data_sheet_allows():
     # Twelve edges: u³ is u/2 and u⁴ is u²/2 in all of them.
     up = CANDIDATES[AXES_OF == 2]
     residual, _ = linear_fit(up, np.random.default_rng(3).normal(size=12) * 4e-4, np.full(12, 4e-4))
-    added = _core.norm_fit_covariance(up, residual / GRAVITY, np.full(12, 4e-4 / GRAVITY))
+    added = _core.errors_of_lengths(up, residual / GRAVITY, np.full(12, 4e-4 / GRAVITY))[0]
     assert 2e-4 < np.sqrt(np.diag(added)[:6].max()) < 3e-3

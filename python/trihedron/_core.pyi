@@ -30,9 +30,9 @@ def fit_norm(readings: FloatArray, noise: FloatArray, gravity_m_s2: float) -> No
 def fit_norm_held_out(
     readings: FloatArray, noise: FloatArray, gravity_m_s2: float, fit: NormFit, folds: Sequence[int]
 ) -> FloatArray: ...
-def norm_fit_covariance(
+def errors_of_lengths(
     up: FloatArray, residual: FloatArray, sigma: FloatArray, prior: float | None = None
-) -> FloatArray: ...
+) -> tuple[FloatArray, list[float], list[float]]: ...
 
 # allan
 @final

@@ -14,7 +14,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<NormFit>()?;
     module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
     module.add_function(wrap_pyfunction!(fit_norm_held_out, module)?)?;
-    module.add_function(wrap_pyfunction!(norm_fit_covariance, module)?)?;
+    module.add_function(wrap_pyfunction!(errors_of_lengths, module)?)?;
     Ok(())
 }
 
@@ -132,23 +132,27 @@ fn fit_norm_held_out<'py>(
     rows(py, &flat, 3)
 }
 
-/// Covariance `(9, 9)` of relative errors of `S` and `b`, from unit verticals `(n, 3)`, gravity errors and their noise
+/// Covariance `(9, 9)` of relative errors of `S` and `b`, log-odds `(3)` of each shape of nonlinear axes against none,
+/// and the mean error `(9)` by them, from unit verticals `(n, 3)`, gravity errors and their noise
 /// `(n,)` in units of |g|; `prior` is their standard deviation beforehand, if any.
 #[pyfunction]
 #[pyo3(signature = (up, residual, sigma, prior=None))]
-fn norm_fit_covariance<'py>(
+fn errors_of_lengths<'py>(
     py: Python<'py>,
     up: PyReadonlyArray2<'py, f64>,
     residual: Vec<f64>,
     sigma: Vec<f64>,
     prior: Option<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<(Bound<'py, PyArray2<f64>>, [f64; 3], Vec<f64>)> {
     let up: Vec<Vector3<f64>> = as_vectors(&flat3("up", &up)?).to_vec();
     if (residual.len(), sigma.len()) != (up.len(), up.len()) {
         return Err(PyValueError::new_err(
             "every vertical needs a residual and its noise",
         ));
     }
-    let fit = || nonlinearity::norm_fit_covariance(&up, &residual, &sigma, prior);
-    rows(py, super::run(py, fit)?.as_slice(), 9)
+    let found = super::run(py, || {
+        nonlinearity::of_lengths(&up, &residual, &sigma, prior)
+    })?;
+    let second = rows(py, found.second.as_slice(), 9)?;
+    Ok((second, found.log_odds, found.mean.as_slice().to_vec()))
 }

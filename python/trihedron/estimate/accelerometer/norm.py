@@ -80,7 +80,7 @@ def _assemble(
     relative_sigma = float(np.median(sigma)) / g
     wrt = wrt_relative_errors(S, fit.b, g)
     prior = _core.ANCHOR if fit.is_anchored else None
-    covariance = wrt @ _core.norm_fit_covariance(up, residual / g, sigma / g, prior) @ wrt.T
+    covariance = wrt @ _core.errors_of_lengths(up, residual / g, sigma / g, prior)[0] @ wrt.T
     observability = design.observability(relative_sigma)
     quality = replace(
         gravity_quality(residual, sigma, dof, (apart[:, 0], apart[:, 1])),

@@ -207,8 +207,8 @@ def _stated(model: Model, blank: NoiseAxis, tails: float, *, is_filtered: bool) 
     terms[TermName.WHITE] = widened(white, math.hypot(bend, tails) * white.estimate)
     findings = blank.findings
     if worst is not None:
-        code = FindingCode.SPECTRUM_UNEXPLAINED
-        findings = (*findings, Finding.of(code, deviation=worst[0], frequency_hz=worst[1]))
+        unexplained = Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=worst[0], frequency_hz=worst[1])
+        findings = (*findings, unexplained)
     return replace(
         blank,
         terms=MappingProxyType(terms),

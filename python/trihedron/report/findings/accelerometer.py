@@ -62,8 +62,8 @@ ENTRIES = {
     (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
         "The gravity error in static poses has the shape of {is_quadratic:?a quadratic nonlinearity|{is_cubic:?a cubic "
         "nonlinearity{is_unlike:? or of a scale that differs between + and -|}|a scale that differs between + and -}} "
-        "(p = {p:.1g}): S and b are off by some {shift_m_s2:.2g mm/s²} at 1 g, {shift_sigma:.2g} σ of what noise alone "
-        "would leave.",
+        "(odds 10^{log10_odds:.0f} against noise): poses in all directions would shift S and b by some "
+        "{shift_m_s2:.2g mm/s²} at 1 g.",
         "An accelerometer that is not linear, or one driven near its range limit.",
         "Run `trihedron diagnose LOG`: it looks for the effect.",
     ),
