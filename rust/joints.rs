@@ -2,6 +2,7 @@
 //! autoregression of the motion above the noise of the sensor (docs/diagnosis-method.md, 8.16).
 
 use std::iter::successors;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
@@ -18,9 +19,10 @@ const FREE: usize = WINDOW - 1;
 const SMOOTHEST: f64 = 1e-9;
 /// Powers of the motion tried in a window, of that of all moves: 10⁻⁵ to 250, in steps of four.
 const POWERS: [i32; 13] = [-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4];
-/// Variances of the shocks of a jolt, of that of the motion's own, and the samples beside the joint that they reach.
-const JOLTS: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
-const SHOCKS: [usize; 3] = [HALF - 1, HALF, HALF + 1];
+/// Variances of the shocks of a motion, of that of its own, and the samples of a window that have them: beside the joint
+/// (a jolt), or all that follow, where another motion begins (a mount that rings when a move stops).
+const SIZES: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
+const SHOCKED: [Range<usize>; 2] = [HALF - 1..HALF + 2, HALF - 1..WINDOW];
 
 /// Samples that are missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +31,7 @@ pub struct Loss {
     pub sample: usize,
     /// Their number, the likeliest.
     pub count: usize,
-    /// Log-likelihood that they gain over none missing, with or without a jolt.
+    /// Log-likelihood that they gain over none missing, with or without shocks.
     pub gain: f64,
     /// The same over motions before and after that have nothing to do with one another.
     pub over_unrelated: f64,
@@ -106,7 +108,7 @@ fn contrasts() -> DMatrix<f64> {
     })
 }
 
-/// Likelihoods of a sensor's windows: with 0, 1, ... samples missing, with jolts of each size, and with sides that have
+/// Likelihoods of a sensor's windows: with 0, 1, ... samples missing, with shocks of each size, and with sides that have
 /// nothing to do with one another.
 struct Sensor<'a> {
     readings: Readings<'a>,
@@ -130,24 +132,25 @@ impl<'a> Sensor<'a> {
             Likelihood::of(&between, power)
         });
         let response = motion.response(WINDOW);
-        let shocked = DMatrix::from_fn(WINDOW, WINDOW, |i, j| {
-            let of = |shock: &usize| match (i.checked_sub(*shock), j.checked_sub(*shock)) {
-                (Some(i), Some(j)) => response[i] * response[j],
-                _ => 0.0,
-            };
-            SHOCKS.iter().map(of).sum::<f64>() / covariance[0]
-        });
-        let plain = DMatrix::from_fn(WINDOW, WINDOW, lag);
+        let shocked = |samples: &Range<usize>, size: f64| {
+            DMatrix::from_fn(WINDOW, WINDOW, |i, j| {
+                let both = samples.clone().take_while(|&shock| shock <= i.min(j));
+                let sum: f64 = both
+                    .map(|shock| response[i - shock] * response[j - shock])
+                    .sum();
+                lag(i, j) + size * sum / covariance[0]
+            })
+        };
+        let shocks = SHOCKED
+            .iter()
+            .flat_map(|samples| SIZES.map(|size| Likelihood::of(&shocked(samples, size), power)));
         let aside = DMatrix::from_fn(WINDOW, WINDOW, |i, j| {
             f64::from(u8::from((i < HALF) == (j < HALF))) * lag(i, j)
         });
         let unrelated = Likelihood::of(&aside, power);
-        let jolts = JOLTS
-            .iter()
-            .map(|size| Likelihood::of(&(&plain + &shocked * *size), power));
         Self {
             readings,
-            each: missing.chain(jolts).chain([unrelated]).collect(),
+            each: missing.chain(shocks).chain([unrelated]).collect(),
         }
     }
 
@@ -266,7 +269,8 @@ fn likeliest(
     if found.1 - rival > 0.5 * least {
         found = best(&mut (1..=most));
         let last = known.first().map_or(0, |one| one.each.len() - 1);
-        rival = (last - JOLTS.len()..last).map(of).fold(rival, f64::max);
+        let shocks = last - SHOCKED.len() * SIZES.len()..last;
+        rival = shocks.map(of).fold(rival, f64::max);
         unrelated = of(last).max(rival);
     }
     Loss {
