@@ -19,10 +19,12 @@ const FREE: usize = WINDOW - 1;
 const SMOOTHEST: f64 = 1e-9;
 /// Powers of the motion tried in a window, of that of all moves: 10⁻⁵ to 250, in steps of four.
 const POWERS: [i32; 13] = [-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4];
-/// Variances of the shocks of a motion, of that of its own, and the samples of a window that have them: beside the joint
-/// (a jolt), or all that follow, where another motion begins (a mount that rings when a move stops).
+/// Variances of the shocks of a motion, of that of its own.
 const SIZES: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
-const SHOCKED: [Range<usize>; 2] = [HALF - 1..HALF + 2, HALF - 1..WINDOW];
+/// Samples of a window that have them: those beside the joint (a jolt), or all from one beside it on, where another motion
+/// begins (a mount that rings when a move stops).
+const JOLT: Range<usize> = HALF - 1..HALF + 2;
+const SHOCKED: [Range<usize>; 3] = [JOLT, HALF - 1..WINDOW, HALF..WINDOW];
 
 /// Samples that are missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +46,13 @@ pub struct Joints {
     pub losses: Vec<Loss>,
     /// Number of joints at which as many missing samples as the median loss has would be one.
     pub telling: usize,
+}
+
+/// Logarithms: the gain that is asked of a loss, and the prior odds that another motion begins at a joint.
+#[derive(Clone, Copy)]
+struct Odds {
+    least: f64,
+    begins: f64,
 }
 
 /// Three axes of a sensor in units of the noise of one sample: `(n, 3)`, row by row.
@@ -164,7 +173,7 @@ impl<'a> Sensor<'a> {
 }
 
 /// The joints inside the moves `[first, last)`, with fewer than `most` samples missing; `least` is the gain that is
-/// asked. No window has a sample behind a gap or at a limit (`is_broken`), or a reading that is not finite.
+/// asked. Another motion begins once a move, at any of its joints alike. No window has a sample behind a gap or at a limit (`is_broken`), or a reading that is not finite.
 ///
 /// # Errors
 /// `BadInput` when the moves are not within the readings, or lengths differ.
@@ -183,6 +192,9 @@ pub fn joints(
         .par_iter()
         .map(|one| Sensor::of(one, moves, most))
         .collect();
+    let n_joints: usize = moves.iter().map(|&[a, b]| b - a).sum();
+    let begins = -(n_joints.max(1) as f64 / moves.len().max(1) as f64).ln();
+    let odds = Odds { least, begins };
     // Counts tried at every joint; all are tried where one of these gains half of what is asked.
     let coarse: Vec<usize> = successors(Some(1), |n| Some(2 * n))
         .take_while(|&n| n <= most)
@@ -198,7 +210,7 @@ pub fn joints(
         is_whole.then_some(windows)
     };
     let seen = |&sample: &usize| {
-        at(sample, 0).map(|whole| likeliest(&known, (sample, &whole), (&coarse, most), least))
+        at(sample, 0).map(|whole| likeliest(&known, (sample, &whole), (&coarse, most), odds))
     };
     let losses = apart(
         places
@@ -215,7 +227,7 @@ pub fn joints(
             .then(|| at(sample, lost))
             .flatten();
         cut.is_some_and(|cut| {
-            likeliest(&known, (sample, &cut), (&[lost], lost), least).over_unrelated > least
+            likeliest(&known, (sample, &cut), (&[lost], lost), odds).over_unrelated > least
         })
     };
     let telling = places.par_iter().filter(tells).count();
@@ -251,7 +263,7 @@ fn likeliest(
     known: &[Sensor<'_>],
     (sample, windows): (usize, &[Window]),
     (coarse, most): (&[usize], usize),
-    least: f64,
+    Odds { least, begins }: Odds,
 ) -> Loss {
     let of = |hypothesis: usize| -> f64 {
         let each = known.iter().zip(windows);
@@ -269,8 +281,9 @@ fn likeliest(
     if found.1 - rival > 0.5 * least {
         found = best(&mut (1..=most));
         let last = known.first().map_or(0, |one| one.each.len() - 1);
-        let shocks = last - SHOCKED.len() * SIZES.len()..last;
-        rival = shocks.map(of).fold(rival, f64::max);
+        let (jolt, n) = (SIZES.len(), SHOCKED.len() * SIZES.len());
+        let shock = |k: usize| of(last - n + k) + if k < jolt { 0.0 } else { begins };
+        rival = (0..n).map(shock).fold(rival, f64::max);
         unrelated = of(last).max(rival);
     }
     Loss {
