@@ -23,8 +23,7 @@ const POWERS: [i32; 13] = [-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4];
 const SIZES: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
 /// Samples of a window that have them: those beside the joint (a jolt), or all from one beside it on, where another motion
 /// begins (a mount that rings when a move stops).
-const JOLT: Range<usize> = HALF - 1..HALF + 2;
-const SHOCKED: [Range<usize>; 3] = [JOLT, HALF - 1..WINDOW, HALF..WINDOW];
+const SHOCKED: [Range<usize>; 3] = [HALF - 1..HALF + 2, HALF - 1..WINDOW, HALF..WINDOW];
 
 /// Samples that are missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,11 +47,11 @@ pub struct Joints {
     pub telling: usize,
 }
 
-/// Logarithms: the gain that is asked of a loss, and the prior odds that another motion begins at a joint.
+/// Logarithms: the gain that is asked of a loss, and the prior odds against shocks at a joint.
 #[derive(Clone, Copy)]
 struct Odds {
     least: f64,
-    begins: f64,
+    rarity: f64,
 }
 
 /// Three axes of a sensor in units of the noise of one sample: `(n, 3)`, row by row.
@@ -173,7 +172,8 @@ impl<'a> Sensor<'a> {
 }
 
 /// The joints inside the moves `[first, last)`, with fewer than `most` samples missing; `least` is the gain that is
-/// asked. Another motion begins once a move, at any of its joints alike. No window has a sample behind a gap or at a limit (`is_broken`), or a reading that is not finite.
+/// asked. Shocks come once a move, at any of its joints alike. No window has a sample behind a gap or at a limit
+/// (`is_broken`), or a reading that is not finite.
 ///
 /// # Errors
 /// `BadInput` when the moves are not within the readings, or lengths differ.
@@ -193,8 +193,8 @@ pub fn joints(
         .map(|one| Sensor::of(one, moves, most))
         .collect();
     let n_joints: usize = moves.iter().map(|&[a, b]| b - a).sum();
-    let begins = -(n_joints.max(1) as f64 / moves.len().max(1) as f64).ln();
-    let odds = Odds { least, begins };
+    let rarity = (n_joints.max(1) as f64 / moves.len().max(1) as f64).ln();
+    let odds = Odds { least, rarity };
     // Counts tried at every joint; all are tried where one of these gains half of what is asked.
     let coarse: Vec<usize> = successors(Some(1), |n| Some(2 * n))
         .take_while(|&n| n <= most)
@@ -263,7 +263,7 @@ fn likeliest(
     known: &[Sensor<'_>],
     (sample, windows): (usize, &[Window]),
     (coarse, most): (&[usize], usize),
-    Odds { least, begins }: Odds,
+    Odds { least, rarity }: Odds,
 ) -> Loss {
     let of = |hypothesis: usize| -> f64 {
         let each = known.iter().zip(windows);
@@ -281,9 +281,8 @@ fn likeliest(
     if found.1 - rival > 0.5 * least {
         found = best(&mut (1..=most));
         let last = known.first().map_or(0, |one| one.each.len() - 1);
-        let (jolt, n) = (SIZES.len(), SHOCKED.len() * SIZES.len());
-        let shock = |k: usize| of(last - n + k) + if k < jolt { 0.0 } else { begins };
-        rival = (0..n).map(shock).fold(rival, f64::max);
+        let shocks = last - SHOCKED.len() * SIZES.len()..last;
+        rival = shocks.map(|k| of(k) - rarity).fold(rival, f64::max);
         unrelated = of(last).max(rival);
     }
     Loss {

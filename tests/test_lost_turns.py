@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import convolve1d
 
 from confidence.motion import G
 from confidence.sensor import lower, recorded
@@ -14,6 +15,7 @@ from trihedron.estimate.gyroscope.lost_samples import could_be_remade, missing_s
 from trihedron.estimate.session import solved
 from trihedron.records import FindingCode, Recording, Severity
 from trihedron.segment import segment_recording
+from trihedron.session.joints import joints
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 STEP_S = 0.01
@@ -109,6 +111,40 @@ def test_healthy_logs_with_brisk_or_slow_moves_lose_nothing(grade, move_s):
     for seed in (5, 6):
         log = session(0.0, seed, move_s, grade)
         assert missing_samples(log, segment_recording(log), 1e-3) == []
+
+
+def ringing_robot(seed):
+    """Readings of both sensors over their noise, 100 Hz, and the moves (m, 2) of a robot that rings when it stops."""
+    rng = np.random.default_rng(seed)
+    lasting, ringing = rng.integers(150, 400, 27), 70
+    starts = 30 + np.cumsum(np.r_[0, lasting[:-1] + 200])
+    rate, force = np.zeros((2, starts[-1] + lasting[-1] + 200, 3))
+    # A tactical unit: 1 rad/s, 1 g; the acceleration stops at once, and the arm swings by 0.03° at 11 Hz.
+    t = np.arange(ringing) / 100.0
+    swing = np.exp(-t / 0.25) * (1.0 - np.exp(-t / 0.02)) * np.sin(2.0 * np.pi * 11.0 * t)
+    for start, n in zip(starts, lasting, strict=True):
+        s = np.arange(n)[:, None] / n
+        rate[start : start + n] += 2300.0 * 16.0 * (s * (1.0 - s)) ** 2 * rng.standard_normal(3)
+        rate[start + n :][:ringing] += 1.2 * np.gradient(swing, 0.01)[:, None] * rng.standard_normal(3)
+        force[start : start + n] += 3300.0 * s**3 * (10.0 - 15.0 * s + 6.0 * s**2) * (end := rng.standard_normal(3))
+        force[start + n :] += 3300.0 * end
+        force[start : start + n] += 4e5 / n**2 * (2.0 - 12.0 * s + 12.0 * s**2) * rng.standard_normal(3)
+    filtered = [convolve1d(one, [0.2, 0.6, 0.2], axis=0) for one in (rate, force)]
+    return [one + rng.standard_normal(one.shape) for one in filtered], np.c_[starts - 10, starts + lasting + ringing]
+
+
+def test_a_mount_that_rings_when_a_move_stops_has_lost_nothing():
+    for seed in range(1, 5):
+        readings, moves = ringing_robot(seed)
+        rows = np.arange(len(readings[0]))
+        assert not joints(readings, rows / 100.0, 100.0, moves).is_certain.any()
+        # Ten samples missing at the middle of every third move are certain all the same.
+        middles = moves[::3].mean(axis=1).astype(int)
+        kept = np.setdiff1d(rows, middles[:, None] + np.arange(10))
+        cut = [one[kept] for one in readings]
+        found = joints(cut, rows[: len(kept)] / 100.0, 100.0, kept.searchsorted(moves))
+        # The place of a loss is exact to a sample where its sides are smooth.
+        assert np.abs(kept[found.sample[found.is_certain]][:, None] + 1 - middles).min(axis=0).max() <= 1
 
 
 def test_several_samples_lost_at_a_time_are_counted_at_the_joints_that_show_as_many():

@@ -18,7 +18,7 @@ MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 class Joints:
     """``count`` samples are missing behind each ``sample`` (k,), clearest first.
 
-    They gain ``gain`` in log-likelihood over none missing and a jolt; where ``is_certain``, also over motions before
+    They gain ``gain`` in log-likelihood over none missing and shocks; where ``is_certain``, also over motions before
     and after that have nothing to do with one another. As many missing samples as the median of those has would be
     certain at ``telling`` joints: long losses show where a single sample does not.
     """
@@ -51,9 +51,9 @@ def joints(
     """Joints of ``moves`` (m, 2) in the ``readings`` (n, 3) of each sensor, in units of the noise of a sample.
 
     An autoregression of the motion (Burg's method, order 10), as large as fits each window of six samples before and
-    six after, and the noise of the sensor, compare: none missing; n missing; none missing and three shocks of any size
-    (docs/diagnosis-method.md, 8.16). No joint is asked at a gap of the timestamps, or near samples that are ``is_cut``
-    (n,).
+    six after, and the noise of the sensor, compare: none missing; n missing; none missing and shocks of any size, of a
+    jolt or of another motion that begins (docs/diagnosis-method.md, 8.16). No joint is asked at a gap of the
+    timestamps, or near samples that are ``is_cut`` (n,).
     """
     is_broken: BoolArray = np.diff(time_s, prepend=time_s[0]) > GAP / rate_hz
     if is_cut is not None:
