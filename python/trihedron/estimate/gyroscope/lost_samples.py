@@ -106,7 +106,7 @@ def possible_losses(recording: Recording, segments: Segments, core: _core.Sessio
 
 
 FEWEST = 4
-"""Losses from which a finding is given: of 25 real logs, one has one that may be a jolt."""
+"""Losses from which a finding is given: of 37 real logs, two have one that may be a jolt."""
 NONE = Joints(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0), np.empty(0, dtype=bool), 0)
 
 
