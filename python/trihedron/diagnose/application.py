@@ -127,7 +127,8 @@ def _variant(entry: Mapping[str, Any], context: SampleContext, left_out: dict[st
     else:
         label, n = model["variant"], len(model["values"])
         try:
-            return next(v for v in effect.variants(context) if v.label == label and v.distortion.n_parameters == n)
+            found = next(v for v in effect.variants(context) if v.label == label and v.distortion.n_parameters == n)
+            return effect.reshaped(context, found, *model["shape"].values()) if found.shape else found
         except SignalMissing as missing:
             left_out[effect_id] = words("because", sentence=missing)
         except StopIteration:

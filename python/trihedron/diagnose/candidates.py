@@ -114,11 +114,14 @@ def offered_beside(
 
 
 def terms_of(model: Hypothesis, effect: Effect, price: float) -> list[Term]:
-    """Every shape of an effect; ``price`` is the correction for the choice among effects."""
+    """Every shape of an effect; ``price`` is the correction for the choice among effects. Its kinds (line, warm-up) are
+    as likely as each other, and the shapes of a kind share that: a lag fitted for nothing is less likely than none."""
     context, places = model.context, {(t.effect.id, t.variant.label) for t in model.terms}
     variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
-    cost = price + 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)))
-    return [Term(effect, v, effect.sizes(context, v), cost) for v in variants]
+    of_kind = Counter(v.label for v in variants)
+    tried = [len(of_kind) * of_kind[v.label] * len(PRIOR_SCALES) for v in variants]
+    costs = price + 2.0 * np.log(tried)
+    return [Term(effect, v, effect.sizes(context, v), float(cost)) for v, cost in zip(variants, costs, strict=True)]
 
 
 def price_of_choice(model: Hypothesis, effects: Sequence[Effect]) -> float:
@@ -236,7 +239,7 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
     final = term.effect.reshaped(model.context, term.variant, value)
     if final is None:
         return term
-    return replace(term, variant=replace(final, shape={name: (value, unit)}, shape_sigma=value * min(sigma, 10.0)))
+    return replace(term, variant=replace(final, shape={name: (value, unit)}, shape_sigma=abs(value) * min(sigma, 10.0)))
 
 
 def renewed(model: Hypothesis) -> Hypothesis:

@@ -166,11 +166,28 @@ class Context:
         logged: FloatArray | None = getattr(self.obs.recording, name)
         return None if logged is None or not np.isfinite(logged).any() else logged
 
+    @staticmethod
+    def _filled(logged: FloatArray) -> FloatArray:
+        """A logged channel with its mean in place of missing values."""
+        return np.where(np.isfinite(logged), logged, np.nanmean(logged))
+
     @cached_property
     def temperature(self) -> FloatArray | None:
         """(points,) logged temperature minus its mean, °C."""
         logged = self._logged("temperature_degc")
         return None if logged is None else np.nan_to_num(self.at_points(logged) - self.references["temperature_degc"])
+
+    def die_temperature(self, lag_s: float) -> FloatArray:
+        """(points,) temperature of which the logged one is a low-pass with the time constant ``lag_s``, minus the mean
+        of the logged one, °C; at a negative one the die's is such a low-pass of the logged one."""
+        logged, rate = self._logged("temperature_degc"), self.temperature_rate
+        assert logged is not None
+        assert rate is not None
+        if lag_s >= 0.0:
+            return np.asarray(self.temperature + lag_s * rate)
+        filled = np.tile(self._filled(logged)[:, None], 3)
+        late = _core.simulate_first_order(filled, 1.0 / self.obs.recording.rate_hz, (-lag_s,) * 3)[:, 0]
+        return self.at_points(late) - self.references["temperature_degc"]
 
     @cached_property
     def temperature_rate(self) -> FloatArray | None:
@@ -178,11 +195,11 @@ class Context:
         recording, logged = self.obs.recording, self._logged("temperature_degc")
         if logged is None:
             return None
-        filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
+        filled = self._filled(logged)
         for window_s in (QUICK_WINDOW_S, TEMPERATURE_WINDOW_S):
-            slope = smoothed_slope(filled, recording.time_s, window_s * recording.rate_hz)
-            # Errors of all readings of a window may be alike, as those of rounding are.
-            if _error_of_one(filled) <= SMALL_PART * window_s * rms_of(slope):
+            width = window_s * recording.rate_hz
+            slope = smoothed_slope(filled, recording.time_s, width)
+            if _error_of_mean(filled, width) <= SMALL_PART * window_s * rms_of(slope):
                 break
         return self.at_points(slope)
 
@@ -316,11 +333,13 @@ def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> Floa
     return np.interp(time_s, time, (4.0 * narrow - wide) / 3.0)
 
 
-def _error_of_one(values: FloatArray) -> float:
-    """Error of one reading: that of rounding to its LSB, or noise, whichever is larger."""
-    steps = np.diff(np.unique(values))
-    lsb = float(steps.min()) if len(steps) else 0.0
-    return max(lsb / math.sqrt(12.0), float(np.diff(values).std()) / math.sqrt(2.0))
+def _error_of_mean(values: FloatArray, width: float) -> float:
+    """Error of a mean over ``width`` samples, of noise and of rounding: by third differences of such means, in which a
+    smooth course cancels."""
+    length = max(round(width), 1)
+    means = values[: len(values) // length * length].reshape(-1, length).mean(axis=1)
+    # The squares of 1, 3, 3, 1 add up to 20.
+    return rms_of(np.diff(means, 3)) / math.sqrt(20.0) if len(means) > 3 else math.inf
 
 
 def _gradient(level: FloatArray, time: FloatArray, width: float) -> FloatArray:

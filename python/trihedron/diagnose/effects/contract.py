@@ -41,7 +41,7 @@ MIN_FALL = 15.0
 place and size."""
 MOST_NAMED = 4
 """Places of one kind that a sentence names: more do not fit a line."""
-SHAPE_NAMES = ("time_constant", "half_width", "pose")
+SHAPE_NAMES = ("time_constant", "half_width", "pose", "thermometer_lag")
 """Names of the shape parameters, which are nonlinear: chosen from a grid, refined at the maximum of the evidence."""
 
 

@@ -10,8 +10,10 @@ from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Ef
 from trihedron.records.words import why_not
 from trihedron.session.drift import LEAST_SWING_K, PER_KELVIN
 
-LEAST_RATE_RANGE = 0.3
-"""Range of the rate of temperature over its largest value, below which it is confounded with a constant."""
+LAGS_S = (5.0, 10.0, 20.0, 40.0)
+"""Lags tried, s, of either sign, then refined: from a thermometer beside the die to one on the board."""
+CURVES = ("linear", "quadratic", "cubic")
+LAG, HYSTERESIS = "lag", "hysteresis"
 BRANCH_K_S = 0.002
 """Rate of change at which a branch reaches three quarters: an oven has ten times as much, a room a tenth."""
 
@@ -52,48 +54,51 @@ class GyroThermalScale(ThermalScale):
 
 
 class ThermalBias(Thermal):
-    """Bias over temperature, with its rate of change, or with another branch while it cools."""
+    """Bias over the temperature of the die, from which the thermometer may lag, or with another branch while it
+    cools."""
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
-        """Quadratic, rate and hysteresis terms change the bias by a third of what the linear term does."""
+        """Quadratic and hysteresis terms change the bias by a third of what the linear term does."""
         assert context.temperature is not None
         swing, per_kelvin = float(np.ptp(context.temperature)), PER_KELVIN[self.sensor]
         beside = per_kelvin * swing / 3.0
         by_name = {"bias_per_kelvin": per_kelvin, "half_gap": beside}
         by_name |= {f"bias_per_kelvin{k}": beside / swing**k for k in (2, 3)}
-        if context.temperature_rate is not None:
-            by_name["bias_per_kelvin_per_s"] = beside / max(float(np.abs(context.temperature_rate).max()), BRANCH_K_S)
         return np.array([by_name[name.rsplit("_", 1)[0]] for name in variant.names])
 
     def variants(self, context: Context) -> list[Variant]:
-        """Forward models, simplest first. Temperature is relative to its mean over the poses, its rate to 0."""
-        assert context.temperature is not None
-        t, speed, unit = context.temperature[:, None], context.temperature_rate, SENSORS[self.sensor].unit
+        """Forward models, simplest first."""
+        assert context.temperature_rate is not None
+        slowest, fastest = context.temperature_rate.min(), context.temperature_rate.max()
+        # Compensation of another log (no poses) needs the fitted shape, whatever that log's temperature does.
+        is_cycle = context.obs.n_poses == 0 or (slowest < -BRANCH_K_S and fastest > BRANCH_K_S)
+        # A log of a temperature cycle in one orientation shows more of the curve than S and b leave to a session.
+        curves, bent = (CURVES[:2], CURVES[:1]) if context.moves else (CURVES, CURVES)
+        out = [self._over_temperature(context, curve) for curve in curves]
+        out += [self._over_temperature(context, f"{curve}, {HYSTERESIS}") for curve in bent if is_cycle]
+        lags = [sign * lag_s for sign in (1.0, -1.0) for lag_s in LAGS_S]
+        return out + [self._over_temperature(context, f"{curve}, {LAG}", one) for curve in bent for one in lags]
+
+    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
+        return self._over_temperature(context, variant.label, value) if variant.shape else None
+
+    def _over_temperature(self, context: Context, label: str, lag_s: float = 0.0) -> Variant:
+        """Temperature is relative to the mean of the logged one over the poses."""
+        assert context.temperature_rate is not None
+        curve, _, beside = label.partition(", ")
+        t, unit = context.die_temperature(lag_s), SENSORS[self.sensor].unit
         powers = [("bias_per_kelvin", t, f"{unit}/K"), ("bias_per_kelvin2", t**2, f"{unit}/K^2"),
                   ("bias_per_kelvin3", t**3, f"{unit}/K^3")]  # fmt: skip
-        shapes = {"linear": powers[:1], "quadratic": powers[:2]}
-        # Compensation of another log (no poses) needs the fitted shape, whatever that log's temperature does.
-        is_fitted, beside = context.obs.n_poses > 0, {}
-        varies = speed is not None and speed.any() and np.ptp(speed) >= LEAST_RATE_RANGE * np.abs(speed).max()
-        if speed is not None and (not is_fitted or varies):
-            beside["rate"] = [("bias_per_kelvin_per_s", speed[:, None], f"{unit}/(K/s)")]
-            if not is_fitted or (speed.min() < -BRANCH_K_S and speed.max() > BRANCH_K_S):
-                beside["hysteresis"] = [("half_gap", np.tanh(speed / BRANCH_K_S)[:, None], unit)]
-        shapes |= {label: [*powers[:1], *more] for label, more in beside.items()}
-        if not context.moves:
-            # A log of a temperature cycle in one orientation shows more of the curve than S and b leave to a session.
-            beside |= {"rate, hysteresis": [*beside["rate"], *beside["hysteresis"]]} if len(beside) > 1 else {}
-            shapes |= {"cubic": powers}
-            shapes |= {f"{name}, {label}": [*powers[:n], *more] for label, more in beside.items()
-                       for name, n in (("quadratic", 2), ("cubic", 3))}  # fmt: skip
-        return [
-            Variant(
-                on_axes(context, self.sensor, *(values for _, values, _ in parts)),
-                tuple(name for symbol, *_ in parts for name in per_axis(symbol)),
-                tuple(of for *_, of in parts for _ in AXES), label=label,
-            )
-            for label, parts in shapes.items()
-        ]  # fmt: skip
+        parts = powers[: 1 + CURVES.index(curve)]
+        if beside == HYSTERESIS:
+            parts.append(("half_gap", np.tanh(context.temperature_rate / BRANCH_K_S), unit))
+        return Variant(
+            on_axes(context, self.sensor, *(values[:, None] for _, values, _ in parts)),
+            tuple(name for symbol, *_ in parts for name in per_axis(symbol)),
+            tuple(of for *_, of in parts for _ in AXES),
+            {"thermometer_lag": (lag_s, "s")} if beside == LAG else {},
+            label,
+        )
 
 
 class AccelThermalBias(ThermalBias):
