@@ -180,11 +180,12 @@ class Context:
     def die_temperature(self, lag_s: float) -> FloatArray:
         """(points,) temperature of which the logged one is a low-pass with the time constant ``lag_s``, minus the mean
         of the logged one, °C; at a negative one the die's is such a low-pass of the logged one."""
-        logged, rate = self._logged("temperature_degc"), self.temperature_rate
+        logged, now, rate = self._logged("temperature_degc"), self.temperature, self.temperature_rate
         assert logged is not None
+        assert now is not None
         assert rate is not None
         if lag_s >= 0.0:
-            return np.asarray(self.temperature + lag_s * rate)
+            return np.asarray(now + lag_s * rate)
         filled = np.tile(self._filled(logged)[:, None], 3)
         late = _core.simulate_first_order(filled, 1.0 / self.obs.recording.rate_hz, (-lag_s,) * 3)[:, 0]
         return self.at_points(late) - self.references["temperature_degc"]
