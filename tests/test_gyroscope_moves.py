@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import trihedron
 from small_session import log_text, rows_of, simulated
@@ -107,6 +108,33 @@ def test_axes_that_are_reversed_or_exchanged_are_named(accelerometer, gyro, said
     if np.count_nonzero(accelerometer - np.diag(np.diag(accelerometer))) == 0:
         stated = [one.seen for one in handedness(gyro * 1e-4, accelerometer * 2.0)]
         assert bool(stated) == bool((accelerometer != gyro).any())
+
+
+def about(angle_deg, axis=(0.0, 0.0, 1.0)):
+    return Rotation.from_rotvec(np.radians(angle_deg) * np.asarray(axis) / np.linalg.norm(axis)).as_matrix()
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "order"), [(0.0, np.eye(3)), (90.0, about(90.0)), (120.0, about(120.0, (1, 1, 1)))]
+)
+def test_a_turned_gyro_is_along_other_axes_only_where_it_is_square_to_them(angle_deg, order):
+    for off_deg, says_turn in ((10.0, False), (30.0, True), (45.0, True)):
+        found = list(handedness(about(off_deg, (1, -2, 3)) @ order @ np.array(SCALE) * 1e-4, np.eye(3) * 2.0))
+        assert [one.severity is Severity.NOTE for one in found] == [says_turn] * (says_turn or angle_deg > 0.0)
+        mirrored = list(handedness(about(off_deg, (1, -2, 3)) @ order @ np.diag([1, 1, -1]) * 1e-4, np.eye(3) * 2.0))
+        assert [one.severity is Severity.WARNING for one in mirrored] == [True]
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_a_gyro_turned_by_fifty_degrees_is_right_handed_unless_it_is_mirrored(mirror):
+    S = np.array(SCALE) @ about(50.0) * np.array([1.0, 1.0, mirror])
+    recording, truth = simulate(scenario(hand_session(16, pose_s=2.0), S=tuple(map(tuple, S))), seed=2)
+    calibration = trihedron.calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
+    (said,) = (one for one in calibration.findings if one.code is FindingCode.LEFT_HANDED)
+    assert said.severity is (Severity.NOTE if mirror > 0.0 else Severity.WARNING)
+    assert mirror < 0.0 or said.numbers["angle_deg"] == pytest.approx(50.0, abs=1.5)
+    diagnosis = trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
+    assert [one.id for one in diagnosis.effects] == ["axis-handedness"] * (mirror < 0.0)
 
 
 @pytest.mark.parametrize(("sensor", "order"), [(0, [1, 0, 2]), (1, [0, 2, 1]), (1, [1, 2, 0])])

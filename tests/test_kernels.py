@@ -6,7 +6,7 @@ from scipy import fft, special
 from scipy.interpolate import CubicSpline
 
 from trihedron import _core, probability
-from trihedron.diagnose.context import smoothed_slope
+from trihedron.diagnose.slope import smoothed_slope
 from trihedron.ranges import ranges_of
 
 RNG = np.random.default_rng(20261)

@@ -44,7 +44,7 @@ def invariants(S: FloatArray, b: FloatArray) -> Invariants:
 
 
 def polar_rotation(axes: FloatArray) -> FloatArray:
-    """(3, 3) the orthogonal matrix nearest to a triad of unit rows."""
+    """(3, 3) the orthogonal matrix nearest to a triad of unit rows or columns."""
     u, _, vt = np.linalg.svd(axes)
     out: FloatArray = u @ vt
     return out

@@ -17,6 +17,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
+from trihedron.invariants import polar_rotation
 from trihedron.records.calibration import Calibration, Frame
 from trihedron.transforms import cross_matrix
 
@@ -40,12 +41,25 @@ def axis_scales(S: FloatArray) -> FloatArray:
     return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(S), axis=1), dtype=np.float64)
 
 
-def order_and_reversed(S: FloatArray) -> tuple[list[int], list[int]]:
-    """The body axis nearest to each sensor axis, and the sensor axes against theirs; as named where two share one."""
-    order = np.argmax(np.abs(S), axis=0)
-    if len(set(order.tolist())) < 3:
-        return [0, 1, 2], []
-    return order.tolist(), np.flatnonzero(S[order, range(3)] < 0.0).tolist()
+SQUARE_RAD = np.radians(15.0)
+"""Angle up to which a triad is along another's axes in some order: parts on a board are square to some degrees."""
+
+
+def order_and_reversed(S: FloatArray) -> tuple[list[int], list[int]] | None:
+    """The body axis of each sensor axis, and the sensor axes against theirs; ``None`` where the triad is turned
+    against the body's axes by more than ``SQUARE_RAD`` from every order of them."""
+    axes = orientation(S)
+    order = np.argmax(np.abs(axes), axis=0)
+    nearest = axes[order, range(3)]
+    # The trace of the rotation left between both; of a reflection it is at most 1.
+    if len(set(order.tolist())) < 3 or np.abs(nearest).sum() < 1.0 + 2.0 * np.cos(SQUARE_RAD):
+        return None
+    return order.tolist(), np.flatnonzero(nearest < 0.0).tolist()
+
+
+def orientation(S: FloatArray) -> FloatArray:
+    """(3, 3) the orthonormal matrix nearest to the directions of the columns of S: a rotation, or a reflection."""
+    return polar_rotation(S / np.linalg.norm(S, axis=0))
 
 
 def other_form_jacobian(S: FloatArray, b: FloatArray) -> FloatArray:

@@ -1,29 +1,20 @@
 """Signals that effects are computed from: the motion of the fitted session along every sensor axis, and logged ones."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
+from scipy.ndimage import convolve1d, uniform_filter1d
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray, rms_of
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.slope import slope_of
 from trihedron.sensor_model import axis_scales
 
-TEMPERATURE_WINDOW_S = 10.0
-"""Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
-QUICK_WINDOW_S = 2.5
-"""The same for a fine thermometer, whose temperature may go up and down within a minute."""
-SMALL_PART = 0.1
-"""Error of the rate of temperature, in its rms, that takes one part in a hundred off an effect's size."""
-BLOCKS_OF_WIDTH = 10
-"""Blocks of samples per smoothing width: the blocks widen it by a part in 2400, and reduce windows of thousands of
-samples to dozens of means."""
 VIBRATION_WINDOW_S = 0.25
 """Window of the parabola that follows the motion while vibration is measured in a move."""
 QUIET = 0.1
@@ -194,15 +185,7 @@ class Context:
     def temperature_rate(self) -> FloatArray | None:
         """(points,) rate of change of the logged temperature, K/s, smoothed as little as its thermometer allows."""
         recording, logged = self.obs.recording, self._logged("temperature_degc")
-        if logged is None:
-            return None
-        filled = self._filled(logged)
-        for window_s in (QUICK_WINDOW_S, TEMPERATURE_WINDOW_S):
-            width = window_s * recording.rate_hz
-            slope = smoothed_slope(filled, recording.time_s, width)
-            if _error_of_mean(filled, width) <= SMALL_PART * window_s * rms_of(slope):
-                break
-        return self.at_points(slope)
+        return None if logged is None else self.at_points(slope_of(self._filled(logged), recording))
 
     @cached_property
     def supply(self) -> FloatArray | None:
@@ -315,37 +298,6 @@ class Context:
     def noise_floor(self) -> FloatArray:
         """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
         return np.asarray(self.noise_density * np.sqrt(self.obs.recording.rate_hz))
-
-
-def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> FloatArray:
-    """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples.
-
-    Timestamps are smoothed too: a straight line keeps its slope across pauses, and to the ends. Smoothing takes
-    ``width²/2`` times its second derivative off a slope, and twice the width four times as much: both together take
-    neither (Richardson), so that the slope of what changes over a few widths keeps its size.
-    """
-    length = max(round(width / BLOCKS_OF_WIDTH), 1)
-    starts = np.arange(0, len(values), length)
-    if len(starts) < 2:
-        return np.zeros(len(values))
-    n = np.diff(starts, append=len(values))
-    level, time = (np.add.reduceat(of, starts) / n for of in (values, time_s))
-    narrow, wide = (_gradient(level, time, times * max(width / length, 1.0)) for times in (1.0, 2.0))
-    return np.interp(time_s, time, (4.0 * narrow - wide) / 3.0)
-
-
-def _error_of_mean(values: FloatArray, width: float) -> float:
-    """Error of a mean over ``width`` samples, of noise and of rounding: by third differences of such means, in which a
-    smooth course cancels."""
-    length = max(round(width), 1)
-    means = values[: len(values) // length * length].reshape(-1, length).mean(axis=1)
-    # The squares of 1, 3, 3, 1 add up to 20.
-    return rms_of(np.diff(means, 3)) / math.sqrt(20.0) if len(means) > 3 else math.inf
-
-
-def _gradient(level: FloatArray, time: FloatArray, width: float) -> FloatArray:
-    smooth, at = (gaussian_filter1d(of, width, mode="nearest") for of in (level, time))
-    return np.asarray(np.gradient(smooth, at))
 
 
 def _sensor_axes(S: FloatArray) -> FloatArray:

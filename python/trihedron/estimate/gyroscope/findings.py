@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import AXES, TINY, FloatArray, sigmas_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
@@ -22,7 +23,7 @@ from trihedron.records import (
     Severity,
 )
 from trihedron.records.words import Words, words
-from trihedron.sensor_model import order_and_reversed
+from trihedron.sensor_model import order_and_reversed, orientation
 from trihedron.session.noise import NOISE_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
@@ -39,7 +40,7 @@ def findings_of(
     S, observability = gyroscope.S, gyroscope.observability
     assert observability is not None
     yield from audit_moves(measured)
-    yield from handedness(S, solution.S_a, recording)
+    yield from handedness(S, solution.S_a, recording, worst_sigma(gyroscope.covariance[:9, :9], S))
     yield from observability_findings(observability, gyroscope.covariance[:9, :9], S, measured)
     if not solution.is_converged:
         yield Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because)
@@ -62,15 +63,24 @@ def findings_of(
     yield from drift_findings("drifts" if is_curve else "poses", measured.bias, measured.bias_excess, S)
 
 
-def handedness(S: FloatArray, S_accelerometer: FloatArray, recording: Recording | None = None) -> Iterator[Finding]:
+def handedness(
+    S: FloatArray, S_accelerometer: FloatArray, recording: Recording | None = None, sigma: float = 0.0
+) -> Iterator[Finding]:
     """LEFT_HANDED when the gyro's axes are not the accelerometer's axes of the same name.
 
     ``M = S_a⁻¹ S_ω`` holds the gyro's axes in those of the accelerometer. Where the handedness of the accelerometer is
     another one than stated, a reflection ``R`` of its frame makes ``S_ω → −R S_ω``: ``M = −1`` is a reflection that
     both sensors share, two reversed axes are the third one of the accelerometer, and a negative exchange of two axes
     is one of the accelerometer's columns. The ``--columns`` that mends an order are named where no sign is wrong.
+    A gyro along none of them is named by its angle, where the directions in S are known to ``sigma`` that is small.
     """
-    order, against = order_and_reversed(np.asarray(np.linalg.solve(S_accelerometer, S), dtype=np.float64))
+    M = np.asarray(np.linalg.solve(S_accelerometer, S), dtype=np.float64)
+    found = order_and_reversed(M)
+    if found is None:
+        if sigma < HARDLY_SEEN:
+            yield _turned(orientation(M))
+        return
+    order, against = found
     moved, others = [i + 1 for i in range(3) if order[i] != i], [i + 1 for i in against]
     mapping = ""
     if recording is not None and len(against) in (0, 3):
@@ -112,6 +122,17 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray, recording: Recording 
                 has_columns=is_known and not against,
                 mapping=mapping,
             )
+
+
+def _turned(axes: FloatArray) -> Finding:
+    """LEFT_HANDED for the gyro's ``axes`` (3, 3), orthonormal, turned or mirrored against the accelerometer's."""
+    if np.linalg.det(axes) < 0.0:
+        return Finding.of(FindingCode.LEFT_HANDED, "gyro-mirrored")
+    vector = _core.vector_from_rotation(axes[None])[0]
+    angle = float(np.linalg.norm(vector))
+    return Finding.of(
+        FindingCode.LEFT_HANDED, "gyro-turned", angle_deg=degrees_from_radians(angle), about=(vector / angle).tolist()
+    )
 
 
 def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, seen: Carried) -> Iterator[Finding]:

@@ -158,6 +158,7 @@ SESSION = {
             "accelerometer {kept:axes} points against gyro {kept:axes}, or gyro {reversed:axes and} are both reversed|"
             "every gyro axis turns against the accelerometer's axis of the same name}}: as documented, the axes form "
             "no right-handed triad.",
+            "mirrored": "the gyro's axes are of the other handedness than the accelerometer's, and along none of them.",
         },
         lines={"directions": "{v0:?−|}{v1:axis}"},
     ),

@@ -110,6 +110,17 @@ _MOVES = {
         "order, read it with --columns {mapping}|}; the calibration itself corrects the gyro's.",
         lines={"directions": "{v0:?−|}{v1:axis}"},
     ),
+    (Code.LEFT_HANDED, "gyro-turned", NOTE): Words(
+        "the gyro is turned against the accelerometer by {angle_deg:.1f}° about the axis {about:all .2f}.",
+        "it is mounted so, or one of the two sensors was read with another frame than stated.",
+        "Compare the angle with the board; S of the gyro contains the rotation.",
+    ),
+    (Code.LEFT_HANDED, "gyro-mirrored", WARNING): Words(
+        "the gyro's axes are of the other handedness than the accelerometer's, and along none of them.",
+        "one documented axis of either sensor is reversed, or two are exchanged, and the gyro is turned against the "
+        "accelerometer.",
+        "Check the axis directions of the board against both data sheets; the calibration itself corrects the gyro's.",
+    ),
     **{
         (Code.OUTLIER_MOVE, case, WARNING): Words(
             f"move {{move}}{at} (pose {{before}} to pose {{after}}) has a tilt error of {{residual_deg:.2g}}°, "
