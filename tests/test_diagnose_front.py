@@ -17,9 +17,10 @@ from diagnosed_session import unit_of
 from trihedron.cli import main
 from trihedron.diagnose import compensate
 from trihedron.diagnose.effects import catalogue
+from trihedron.errors import InputError
 from trihedron.files.calibration import schema_of, violation
 from trihedron.files.log import write_recording
-from trihedron.records import FindingCode
+from trihedron.records import FindingCode, Recording
 from trihedron.simulate import diagnosed_sizes, hand_session, profile_by_name, simulate, with_effect
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
@@ -125,6 +126,22 @@ def test_an_effect_taken_off_sample_by_sample_leaves_the_motion(effect_id):
     before, after = (np.max(np.abs((r.gyroscope if is_gyros else r.accelerometer) - true)) for r in (recording, done))
     # Two passes of the fixed point and temperature logged in steps of 0.01 K leave per mille of the effect.
     assert after < 0.02 * before
+
+
+@pytest.mark.parametrize(("shape", "is_known"), [({"thermometer_lag": 10.0}, True), ({}, False)])
+def test_a_thermal_bias_is_taken_off_at_the_temperature_of_a_die_that_the_thermometer_follows(shape, is_known):
+    t = np.arange(6000) / 50.0
+    force = np.random.default_rng(1).normal([0.0, 0.0, 9.8], 0.01, (6000, 3))
+    log = Recording.from_arrays(t, force, temperature_degc=25.0 + 0.1 * t)
+    effect = {"id": "accel-thermal-bias", "model": {"variant": "linear, lag", "shape": shape, "values": [0.01, 0, 0]}}
+    how = log, [effect], {"temperature_degc": 25.0}, (np.eye(3), np.zeros(3)), None
+    if not is_known:
+        with pytest.raises(InputError, match="with its shape"):
+            compensate(*how)
+        return
+    # The die is a kelvin ahead on a ramp of 0.1 K/s.
+    left = compensate(*how).accelerometer[:, 0] - force[:, 0]
+    assert left == pytest.approx(-0.01 * (0.1 * t + 1.0), abs=1e-6)
 
 
 def test_every_accepted_effect_is_simulated_or_left_out_with_a_reason():

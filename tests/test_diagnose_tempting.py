@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 import trihedron
 from confidence import design
@@ -80,6 +81,38 @@ def test_it_is(name):
     assert_not_taken_in(found, effect)
     # Its evidence is in the samples, where no other has any.
     assert effect != "timing-jitter" or found.effects[0].id == effect
+
+
+def low_pass(values, dt_s, tau_s):
+    keep = np.exp(-dt_s / tau_s)
+    return lfilter([1.0 - keep], [1.0, -keep], values - values[0]) + values[0]
+
+
+@pytest.mark.parametrize(
+    ("lag_s", "seed"), [(20.0, 1), (-20.0, 2), pytest.param(8.0, 3, marks=pytest.mark.slow), (35.0, 4)]
+)
+def test_a_bias_follows_the_temperature_of_the_die_and_a_thermometer_beside_it_lags(lag_s, seed):
+    recording, truth = simulate(session("mpu", seed), seed)
+    own, t = np.array([5e-4, -4e-4, 6e-4]), recording.time_s - recording.time_s[0]
+    logged = 30.0 - 12.0 * np.exp(-t / 40.0) + 1.5 * np.sin(2.0 * np.pi * t / 70.0)
+    late = low_pass(logged, 1.0 / recording.rate_hz, abs(lag_s))
+    die, logged = (logged, late) if lag_s > 0.0 else (late, logged)
+    per_raw = np.linalg.solve(truth.gyroscope_S, own)
+    read = recording.gyroscope + (die - die[0])[:, None] * per_raw
+    found = trihedron.diagnose(
+        replace(recording, gyroscope=read, temperature_degc=np.round(16.0 * logged) / 16.0),
+        gravity_m_s2=truth.gravity_m_s2,
+    )
+    assert_not_taken_in(found, "gyro-thermal-bias")
+    effect = found.effects[0]
+    # A drift explains more than the temperature as it was logged.
+    assert (effect.id, effect.model["variant"]) == ("gyro-thermal-bias", "linear, lag")
+    numbers = {one.name: one for one in effect.parameters}
+    for name, true in (
+        ("thermometer_lag", lag_s),
+        *((f"bias_per_kelvin_{a}", v) for a, v in zip("xyz", own, strict=True)),
+    ):
+        assert abs(numbers[name].value - true) < 4.0 * numbers[name].std
 
 
 @pytest.mark.parametrize(

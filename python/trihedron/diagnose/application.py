@@ -128,9 +128,10 @@ def _variant(entry: Mapping[str, Any], context: SampleContext, left_out: dict[st
         label, n = model["variant"], len(model["values"])
         try:
             found = next(v for v in effect.variants(context) if v.label == label and v.distortion.n_parameters == n)
-            return effect.reshaped(context, found, *model["shape"].values()) if found.shape else found
+            shape = [float(model["shape"][name]) for name in found.shape]
+            return effect.reshaped(context, found, *shape) if shape else found
         except SignalMissing as missing:
             left_out[effect_id] = words("because", sentence=missing)
-        except StopIteration:
-            raise InputError(f"effect {effect_id!r} has no variant {label!r} of {n} values") from None
+        except (StopIteration, KeyError):
+            raise InputError(f"effect {effect_id!r} has no variant {label!r} of {n} values with its shape") from None
     return None
