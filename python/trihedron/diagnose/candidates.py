@@ -27,7 +27,8 @@ N_LEADERS = 3
 AT_ONCE = 16
 """Effects whose columns are computed together."""
 SHAPES_KEPT = 2
-"""Shapes kept per effect, counted separately for those with a plausible and those with an implausible size."""
+"""Shapes kept per effect, counted separately for those with a plausible and those with an implausible size, and for
+those with a shape parameter and those without."""
 NEAR = 6.0
 """Difference of scores below which two explanations are named together: odds of twenty to one."""
 
@@ -148,10 +149,11 @@ def _ahead(seen: list[tuple[Term, bool, FloatArray]]) -> list[tuple[Term, bool, 
     """Those of some terms that lead at any strengths, by their gains (prior scales, strengths)."""
     kept: dict[int, tuple[Term, bool, FloatArray]] = {}
     for best in zip(*(gain.max(axis=0) for *_, gain in seen), strict=True):
-        count: Counter[tuple[str, bool]] = Counter()
+        count: Counter[tuple[str, bool, bool]] = Counter()
         led: set[str] = set()
         for k in sorted(range(len(seen)), key=lambda k: -best[k]):
-            shape = seen[k][0].effect.id, seen[k][1]
+            term, can_be, _ = seen[k]
+            shape = term.effect.id, can_be, bool(term.variant.shape)
             if count[shape] < SHAPES_KEPT and (shape[0] in led or len(led) < N_LEADERS):
                 count[shape] += 1
                 led.add(shape[0])
