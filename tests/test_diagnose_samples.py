@@ -106,3 +106,11 @@ def test_a_table_is_named_with_its_size(scenario, effect_id, size, said):
     found = {one.name: one for one in effect.parameters}
     for name, value in said.items():
         assert abs(found[name].value - value) < 3.0 * found[name].std
+
+
+def test_a_pause_of_the_logger_inside_a_pose_is_no_misfit():
+    made = simulate(scenario_by_name("hand-session"), 3)[0]
+    pose = trihedron.segment(made).poses[9]
+    middle = (pose.start + pose.stop) // 2
+    late = made.time_s + 45.0 * (np.arange(made.n_samples) > middle)
+    assert trihedron.diagnose(replace(made, time_s=late), gravity_m_s2=9.80665).verdict == "consistent"

@@ -211,9 +211,10 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         start, stop = max(move.start - 1, 0), min(move.stop + 1, recording.n_samples)
         values = recording.accelerometer[start:stop]
         finite = np.isfinite(values).all() and (raw_rate is None or np.isfinite(raw_rate[start:stop]).all())
-        # Between poses hours apart neither angle nor velocity can be integrated.
-        is_short = recording.time_s[stop - 1] - recording.time_s[start] <= LONGEST_MOVE_S
-        if finite and is_short and stop - start >= 3:
+        # Neither angle nor velocity can be integrated between poses hours apart, or across a gap: most of a move.
+        lasts, steps = t[stop - 1] - t[start], np.diff(t[start:stop])
+        is_known = lasts <= LONGEST_MOVE_S and steps.max(initial=0.0) < 0.5 * lasts
+        if finite and is_known and stop - start >= 3:
             ranges.append((start, stop))
             poses.append((move.pose_before, move.pose_after))
     noise, of_moves = measure_noise(recording, segments, ranges)
