@@ -5,9 +5,8 @@
 
 Poses rest on a support; between them a hand carries the sensor along bowed paths. ``pauses``: it stops on the way for
 0.4 to 1 s, nearly still, in the air. ``waits``: for 1 to 2.5 s. ``short``: poses of 1.0 to 1.3 s among longer ones.
-``shaken``: a line of 3 mm/s² to 3 m/s² (a motor, a table) through some poses or all, with sidebands, not quite steady;
-in half of the sessions it turns the sensor too. ``plain``: none of these.
-``all``: together.
+``shaken``: a line of 3 mm/s² to 3 m/s² through some poses or all, with sidebands, not quite steady; in half of the
+sessions it turns the sensor too. ``plain``: none of these. ``all``: together.
 """
 
 from __future__ import annotations

@@ -17,16 +17,6 @@ TERMS = {"white": {}, "walk": {"K": (0.03,) * 3}, "flicker": {"B": (0.5,) * 3}, 
 logs = int(sys.argv[1]) if len(sys.argv) > 1 else 500
 limits = {"slow change": slow_changes.EARNED, "two levels": two_levels.EARNED}
 two_levels.EARNED, two_levels.FEWEST = -math.inf, 0
-
-
-def rise_of_change(x):
-    """The largest rise per parameter of a change above noise alone."""
-    means = slow_changes.block_means(x)
-    alone = means.beside(())
-    more = ((means.refined(alone, is_wave=is_wave), 2 + is_wave) for is_wave in (False, True))
-    return max((alone.deviance - one.deviance) / n for one, n in more)
-
-
 for noise, terms in TERMS.items():
     rise = {name: [] for name in limits}
     for seed in range(logs):
@@ -35,7 +25,11 @@ for noise, terms in TERMS.items():
             # Correlation times from 3 readings to half of the log.
             rng, decay = np.random.default_rng(seed), math.exp(-(10.0 ** (-3.0 + 2.5 * seed / logs)))
             x += 3.0 * lfilter([math.sqrt(1.0 - decay**2)], [1.0, -decay], rng.normal(size=N))
-        rise["slow change"].append(rise_of_change(x))
+        means = slow_changes.block_means(x)
+        alone = means.beside(())
+        # Rise per parameter of an exponential and of a wave.
+        more = [(alone.deviance - means.refined(alone, is_wave=n == 3).deviance) / n for n in (2, 3)]
+        rise["slow change"].append(max(more))
         rise["two levels"].append(two_levels.two_levels(x, 1.0).rise)
     for name, limit in limits.items():
         start = np.quantile(rise[name], 0.95)
