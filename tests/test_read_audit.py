@@ -55,6 +55,9 @@ def test_gaps_are_counted_with_place_and_length(tmp_path):
     # Row 1000 stands in line 1002: the header is line 1.
     assert "line 1002" in gap.seen
     assert gap.severity is Severity.WARNING
+    # A pause of a third of the log is no link that loses samples.
+    paused = np.delete(counts(), range(1000, 2000), axis=0)
+    assert finding(read(tmp_path, paused), FindingCode.TIME_GAP).severity is Severity.WARNING
 
 
 def test_jitter_is_given_in_milliseconds_and_does_not_change_the_rate(tmp_path):

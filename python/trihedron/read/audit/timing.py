@@ -170,10 +170,12 @@ def _gap(step: FloatArray, lost: IntArray, place: Place) -> Finding:
     longest = int(gaps[np.argmax(step[gaps])])
     total = int(lost.sum())
     fraction = total / (len(step) + 1 + total)
+    # One gap, however long, is a pause of the logger: a link that loses samples has others.
+    others = total - int(lost[longest])
     worst = sorted(gaps[np.argsort(step[gaps])[::-1][:3]].tolist())
     return Finding.of(
         FindingCode.TIME_GAP,
-        severity=Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
+        severity=Severity.SERIOUS if others > SERIOUS_LOSS * (len(step) + 1 + others) else Severity.WARNING,
         count=len(gaps),
         lost_samples=total,
         fraction=fraction,

@@ -29,7 +29,7 @@ _TIMESTAMPS = {
     (Code.TIME_GAP, "", WARNING): Words(
         "{count:# gap}, about {lost_samples:# sample} lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s. "
         "Where: {worst:each; }{has_more:?; and others|}.",
-        "Lost packets or a full buffer.",
+        "Lost packets, a full buffer, or a pause of the logger.",
         _INTEGRATED,
         numbers=("sample",),
         or_severity=SERIOUS,
