@@ -132,6 +132,8 @@ fn fit_norm_held_out<'py>(
     rows(py, &flat, 3)
 }
 
+type ErrorsOfLengths<'py> = (Bound<'py, PyArray2<f64>>, [f64; 3], Vec<f64>);
+
 /// Covariance `(9, 9)` of relative errors of `S` and `b`, log-odds `(3)` of each shape of nonlinear axes against none,
 /// and the mean error `(9)` by them, from unit verticals `(n, 3)`, gravity errors and their noise
 /// `(n,)` in units of |g|; `prior` is their standard deviation beforehand, if any.
@@ -143,7 +145,7 @@ fn errors_of_lengths<'py>(
     residual: Vec<f64>,
     sigma: Vec<f64>,
     prior: Option<f64>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, [f64; 3], Vec<f64>)> {
+) -> PyResult<ErrorsOfLengths<'py>> {
     let up: Vec<Vector3<f64>> = as_vectors(&flat3("up", &up)?).to_vec();
     if (residual.len(), sigma.len()) != (up.len(), up.len()) {
         return Err(PyValueError::new_err(
