@@ -167,6 +167,15 @@ def test_large_effects_of_both_sensors_are_found_and_a_drift_is_no_temperature()
     assert {one.id for one in found.effects} == {"gyro-scale-nonlinearity", "accel-bias-drift"}
 
 
+def test_a_bias_that_follows_the_rate_of_temperature_on_each_axis_by_a_factor_of_its_own_is_no_drift():
+    made, truth = simulate(session(), 1)
+    cycle = 28.0 + 4.0 * np.sin(2.0 * np.pi * made.time_s / 90.0)
+    bias = np.outer(cycle - 28.0, (2e-4, -1e-4, 3e-4)) + np.outer(np.gradient(cycle, made.time_s), (-0.02, 0.015, 0.02))
+    rate = made.gyroscope + np.round(np.linalg.solve(truth.gyroscope_S, bias.T).T)
+    found = trihedron.diagnose(replace(made, gyroscope=rate, temperature_degc=cycle), gravity_m_s2=truth.gravity_m_s2)
+    assert [(one.id, one.model["variant"]) for one in found.effects] == [("gyro-thermal-bias", "linear, rate")]
+
+
 def test_the_earth_is_no_force_on_the_gyro_where_clipped_moves_break_the_chain_of_headings():
     # Its vertical part along gravity is an isotropic g-sensitivity; its horizontal part needs headings.
     turning = with_effect(session("tactical"), "earth-rate", latitude_deg=55.0, heading_deg=40.0)

@@ -185,9 +185,8 @@ class _Search:
                     scored.append((2.0 * changed.log_evidence - fitted.cost, changed, fitted))
             _, model, chosen = max(scored, key=lambda one: one[0])
             least = model.log_evidence - 0.5 * NEAR
-            rivals[chosen.effect.id] = tuple(
-                t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect
-            )
+            beside = (t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect)
+            rivals[chosen.effect.id] = tuple(dict.fromkeys(beside))
             against |= {one.term.effect.id: chosen.effect.id for one in tried if one.score > self.limit}
             against.pop(chosen.effect.id, None)
         return model, rivals, against

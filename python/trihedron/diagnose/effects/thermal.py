@@ -13,7 +13,7 @@ from trihedron.session.drift import LEAST_SWING_K, PER_KELVIN
 LAGS_S = (5.0, 10.0, 20.0, 40.0)
 """Lags tried, s, of either sign, then refined: from a thermometer beside the die to one on the board."""
 CURVES = ("linear", "quadratic", "cubic")
-LAG, HYSTERESIS = "lag", "hysteresis"
+LAG, RATE, HYSTERESIS = "lag", "rate", "hysteresis"
 BRANCH_K_S = 0.002
 """Rate of change at which a branch reaches three quarters: an oven has ten times as much, a room a tenth."""
 
@@ -58,12 +58,14 @@ class ThermalBias(Thermal):
     cools."""
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
-        """Quadratic and hysteresis terms change the bias by a third of what the linear term does."""
+        """Quadratic, rate and hysteresis terms change the bias by a third of what the linear term does."""
         assert context.temperature is not None
         swing, per_kelvin = float(np.ptp(context.temperature)), PER_KELVIN[self.sensor]
         beside = per_kelvin * swing / 3.0
         by_name = {"bias_per_kelvin": per_kelvin, "half_gap": beside}
         by_name |= {f"bias_per_kelvin{k}": beside / swing**k for k in (2, 3)}
+        if context.temperature_rate is not None:
+            by_name["bias_per_kelvin_per_s"] = beside / max(float(np.abs(context.temperature_rate).max()), BRANCH_K_S)
         return np.array([by_name[name.rsplit("_", 1)[0]] for name in variant.names])
 
     def variants(self, context: Context) -> list[Variant]:
@@ -76,6 +78,8 @@ class ThermalBias(Thermal):
         curves, bent = (CURVES[:2], CURVES[:1]) if context.moves else (CURVES, CURVES)
         out = [self._over_temperature(context, curve) for curve in curves]
         out += [self._over_temperature(context, f"{curve}, {HYSTERESIS}") for curve in bent if is_cycle]
+        # Gradients across the part follow the rate, on each axis by a factor of its own.
+        out += [self._over_temperature(context, f"{curve}, {RATE}") for curve in bent]
         lags = [sign * lag_s for sign in (1.0, -1.0) for lag_s in LAGS_S]
         return out + [self._over_temperature(context, f"{curve}, {LAG}", one) for curve in bent for one in lags]
 
@@ -90,7 +94,9 @@ class ThermalBias(Thermal):
         powers = [("bias_per_kelvin", t, f"{unit}/K"), ("bias_per_kelvin2", t**2, f"{unit}/K^2"),
                   ("bias_per_kelvin3", t**3, f"{unit}/K^3")]  # fmt: skip
         parts = powers[: 1 + CURVES.index(curve)]
-        if beside == HYSTERESIS:
+        if beside == RATE:
+            parts.append(("bias_per_kelvin_per_s", context.temperature_rate, f"{unit}/(K/s)"))
+        elif beside == HYSTERESIS:
             parts.append(("half_gap", np.tanh(context.temperature_rate / BRANCH_K_S), unit))
         return Variant(
             on_axes(context, self.sensor, *(values[:, None] for _, values, _ in parts)),
