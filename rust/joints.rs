@@ -21,8 +21,8 @@ const SMOOTHEST: f64 = 1e-9;
 const POWERS: [i32; 13] = [-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4];
 /// Variances of the shocks of a motion, of that of its own.
 const SIZES: [f64; 6] = [1e1, 1e2, 1e3, 1e4, 1e5, 1e6];
-/// Samples of a window that have them: those beside the joint (a jolt), or all from one beside it on, where another motion
-/// begins (a mount that rings when a move stops).
+/// Samples of a window that have them: those beside the joint (a jolt), or all from one beside it on, where another
+/// motion begins (a mount that rings when a move stops).
 const SHOCKED: [Range<usize>; 3] = [HALF - 1..HALF + 2, HALF - 1..WINDOW, HALF..WINDOW];
 
 /// Samples that are missing.
@@ -116,8 +116,8 @@ fn contrasts() -> DMatrix<f64> {
     })
 }
 
-/// Likelihoods of a sensor's windows: with 0, 1, ... samples missing, with shocks of each size, and with sides that have
-/// nothing to do with one another.
+/// Likelihoods of a sensor's windows: with 0, 1, ... samples missing, with shocks of each size, and with sides that
+/// have nothing to do with one another.
 struct Sensor<'a> {
     readings: Readings<'a>,
     each: Vec<Likelihood>,

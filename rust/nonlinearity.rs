@@ -142,7 +142,7 @@ pub struct OfLengths {
     pub mean: DVector<f64>,
 }
 
-/// Errors of a fit of lengths of gravity from unit verticals, residuals of the lengths and their noise, in units of |g|.
+/// Errors of a fit of lengths of gravity from unit verticals, residuals of the lengths and their noise, by |g|.
 /// Biases may scatter from pose to pose by any amount, axes be nonlinear beside each (11.12b, 11.12c); `prior` is the
 /// standard deviation of the parameters beforehand, if any.
 ///

@@ -48,8 +48,8 @@ pub struct Poses<'a> {
 pub struct Settling {
     /// Twice the log-likelihood that it gains over scatter, less the cost of the time constants tried.
     pub score: f64,
-    /// The same score of a bias that settles, over scatter or the support, whichever is likelier; or that by which gravity
-    /// prefers it to a rotation of any course, whichever is less.
+    /// The same score of a bias that settles, over scatter or the support, whichever is likelier; or that by which
+    /// gravity prefers it to a rotation of any course, whichever is less.
     pub of_bias: f64,
     /// Motion of every pose.
     pub motion: Vec<PoseMotion>,
