@@ -21,34 +21,13 @@ pub fn play(path: &[f64], columns: usize, half_width: f64) -> Vec<f64> {
     out
 }
 
-/// Time derivative inside moves, zero outside: by the parabola through three samples, at ends by two.
+/// Time derivative inside moves, zero outside: the slope of the cubic spline of every move with zero slope at both ends.
+/// A difference of neighbours would lose 6 % at a tenth of the sampling frequency, where hands tremble.
 #[must_use]
 pub fn derivative(time: &[f64], values: &[[f64; 3]], moves: &[Edges]) -> Vec<[f64; 3]> {
     let mut out = vec![[0.0; 3]; values.len()];
     for &[start, stop] in moves {
-        if stop < start + 2 {
-            continue;
-        }
-        let slope =
-            |k: usize, c: usize| (values[k + 1][c] - values[k][c]) / (time[k + 1] - time[k]);
-        for c in 0..3 {
-            out[start][c] = slope(start, c);
-            out[stop - 1][c] = slope(stop - 2, c);
-        }
-        for k in start + 1..stop - 1 {
-            let (before, after) = (time[k] - time[k - 1], time[k + 1] - time[k]);
-            let whole = before + after;
-            let weights = [
-                -after / (before * whole),
-                (after - before) / (before * after),
-                before / (after * whole),
-            ];
-            for c in 0..3 {
-                out[k][c] = weights[0] * values[k - 1][c]
-                    + weights[1] * values[k][c]
-                    + weights[2] * values[k + 1][c];
-            }
-        }
+        out[start..stop].copy_from_slice(&spline_slopes(&time[start..stop], &values[start..stop]));
     }
     out
 }

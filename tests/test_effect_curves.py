@@ -184,10 +184,11 @@ def test_a_gyro_that_averages_over_many_samples_lags_and_has_no_other_effect():
     mean = np.apply_along_axis(np.convolve, 0, before, np.full(n, 1.0 / n), mode="valid")
     result = diagnose(replace(log, gyroscope=mean), gravity_m_s2=truth.gravity_m_s2)
     (effect,) = result.effects
-    assert effect.id == "sensor-lag"
-    (lag,) = effect.parameters
-    assert lag.name == "gyro_lag"
-    assert abs(lag.value - 0.5 * (n - 1) / log.rate_hz) < 4.0 * lag.std
+    # This noise hides what separates a running mean from a delay, a third of its lag squared.
+    assert {effect.id, *effect.confounded_with} == {"sensor-lag", "accel-gyro-time-offset"}
+    lag = effect.parameters[0]
+    assert lag.name in ("gyro_lag", "accelerometer_delay")
+    assert abs(abs(lag.value) - 0.5 * (n - 1) / log.rate_hz) < 4.0 * lag.std
 
 
 def test_a_bias_that_remembers_the_last_turn_is_said_so_with_its_size():

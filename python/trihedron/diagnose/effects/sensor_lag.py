@@ -1,9 +1,9 @@
-"""A delay between the sensors, or a low-pass of one of them, to all orders that a recording can determine.
+"""A delay between the sensors, or a low-pass of one of them, by the first two moments of its response.
 
-A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); after a low-pass of first order
-x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y'', after a running mean over 2τ, which trails by τ,
-x(t) = y(t + τ) - τ²/6 y''(t + τ). All begin with τ y'; the next term separates them.
-Columns are computed for a time of a grid and scale with their parameter, which must come out near one.
+A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); after a low-pass whose impulse response has
+the mean τ and the variance v, x(t) = y(t + τ) - v/2 y''(t + τ). First order has v = τ², n equal poles τ²/n, a running
+mean τ²/3, Butterworth's of second order 0. Columns are computed for a time of a grid and scale with their parameter,
+which must come out near one.
 """
 
 import numpy as np
@@ -12,6 +12,7 @@ from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on, on_axes, per_axis
 from trihedron.diagnose.session.solve import Distortion
+from trihedron.records.diagnosis import EffectParameter
 
 TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
 """Times tried, s, each twice the one before: a parameter from 1/√2 to √2 covers the times between."""
@@ -21,10 +22,12 @@ LEAST_STEPS = 0.25
 """In sample intervals: a shorter time constant decays by e⁻⁴ within a sample, and its column is that of a delay."""
 SIGMAS = 3.0
 """Standard errors by which a lag may be negative: filters are causal."""
-FIRST_ORDER_S = 0.01
-"""s: unit of the first-order columns; their parameter is a lag in hundredths of a second."""
-SECOND, MEAN = "second order", "running mean"
-"""Shapes whose columns depend on the lag."""
+AXES_S = 0.01
+"""s: unit of the columns of single axes; their parameters are lags in hundredths of a second."""
+USUAL_SMOOTHING, SMOOTHING_SIGMA = 0.5, (0.35, 1.0)
+"""Variance of a filter's response over the square of its lag: from 0 to 1; prior σ about it, and of one that both
+sensors have beyond that of the session."""
+SEPARATE, DELAYS, BOTH = "per axis", ", without smoothing", "smoothing_of_both"
 
 
 def is_near_one(value: FloatArray, covariance: FloatArray) -> bool:
@@ -34,7 +37,7 @@ def is_near_one(value: FloatArray, covariance: FloatArray) -> bool:
 
 
 class SensorLag(Effect):
-    """Lag τ of one sensor's reading behind the motion, of first order (also per axis) or second order."""
+    """Low-pass of one sensor's readings: its lag τ and smoothing v/τ, or a lag of first order per axis."""
 
     id = "sensor-lag"
     needs_moves = True
@@ -42,60 +45,67 @@ class SensorLag(Effect):
     """s: the delay of a filter."""
 
     def variants(self, context: Context) -> list[Variant]:
-        unit, out = FIRST_ORDER_S, []
-        for sensor, slope in enumerate((context.force_rate, context.angular_acceleration)):
-            columns = acting_on(sensor, -unit * slope[:, :, None])
-            name = SENSORS[sensor].label
-            out.append(Variant(columns, (f"{name}_lag",), ("s",), label=name, scale=unit))
-        for sensor, label in enumerate(("accelerometer, per axis", "gyro, per axis")):
-            columns = on_axes(context, sensor, -unit * context.derivative(context.axis_motion(sensor)))
-            name = SENSORS[sensor].label
-            out.append(Variant(columns, per_axis(f"{name}_lag"), ("s",) * 3, label=label, scale=unit))
+        out = []
+        for sensor, side in enumerate(SENSORS):
+            columns = on_axes(context, sensor, -AXES_S * context.derivative(context.axis_motion(sensor)))
+            names = per_axis(f"{side.label}_lag")
+            out.append(Variant(columns, names, ("s",) * 3, label=f"{side.label}, {SEPARATE}", scale=AXES_S))
         # A shorter time than the sampling resolves is that of a delay.
         least_s = LEAST_STEPS / context.obs.recording.rate_hz
         times = [t for t in TIMES_S if t >= least_s] or [TIMES_S[-1]]
         return out + [
-            _filtered(context, sensor, t, f"{SENSORS[sensor].label}, {kind}, {1e3 * t:.0f} ms")
-            for kind in (SECOND, MEAN)
+            _low_pass(context, sensor, t, f"{side.label}, {1e3 * t:.0f} ms{shape}")
             for t in times
-            for sensor in range(2)
+            for sensor, side in enumerate(SENSORS)
+            for shape in ("", DELAYS)
         ]
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
-        if not _has_size(variant) or not value[0] > 0.0:
+        if SEPARATE in variant.label or not value[0] > 0.0:
             return None
         sensor = int(variant.label.startswith(SENSORS[1].label))
-        return _filtered(context, sensor, variant.scale * float(value[0]), variant.label)
+        return _low_pass(context, sensor, variant.scale * float(value[0]), variant.label)
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
-        sigma = sigmas_of(covariance)
-        if (value < -SIGMAS * sigma).any() or not (value > 0.0).any():
-            return False
-        return not _has_size(variant) or is_near_one(value, covariance)
+        if SEPARATE in variant.label:
+            return bool((value > -SIGMAS * sigmas_of(covariance)).all() and (value > 0.0).any())
+        return is_near_one(value, covariance) and value[0] > 0.0
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        sizes = super().sizes(context, variant)
+        return sizes if SEPARATE in variant.label else np.array([sizes[0], *SMOOTHING_SIGMA][: len(sizes)])
+
+    def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
+        every = super().parameters(variant, value, covariance)
+        if variant.names[-1] != BOTH:
+            return every
+        of_lag, name = np.array([USUAL_SMOOTHING, 1.0]), variant.names[1]
+        std = float(np.sqrt(of_lag @ covariance[:2, :2] @ of_lag))
+        return every[0], EffectParameter(name, variant.scale * float(of_lag @ value[:2]), variant.scale * std, "s")
 
 
-def _has_size(variant: Variant) -> bool:
-    return SECOND in variant.label or MEAN in variant.label
-
-
-def _filtered(context: Context, sensor: int, lag_s: float, label: str) -> Variant:
-    """What a second-order low-pass of this lag, or a running mean over twice the lag, adds to readings.
+def _low_pass(context: Context, sensor: int, lag_s: float, label: str) -> Variant:
+    """What a low-pass adds to readings: by a lag of this size with the usual variance for it, by a variance of the
+    square of this size beyond that, and by one of both sensors beyond that of the session (eq. 11.6d), no effect.
 
     That of the gyro on a clock that is late by the lag: the accelerometer is early, and the rate keeps its phase. With
     the lag in the rate a fit that begins without one ends in another minimum.
     """
-    values, late_s = (context.rate, lag_s) if sensor else (context.force, 0.0)
     step = max(0.5 * lag_s, 1.0 / context.obs.recording.rate_hz)
-    at = (lag_s if MEAN in label else 0.0) - late_s
-    here, after, before = (context.shifted(values, t) for t in (at, at + step, at - step))
-    bent = (lag_s / step) ** 2 * (after - 2.0 * here + before)
-    truth = here - bent / 6.0
-    if SECOND in label:
-        truth = here + lag_s * context.shifted(context.derivative(values), at) + 0.5 * bent
-    column = (values - truth)[:, :, None]
-    early = (context.force - context.shifted(context.force, -lag_s))[:, :, None]
-    distortion = Distortion(early, column) if sensor else acting_on(0, column)
-    return Variant(distortion, (f"{SENSORS[sensor].label}_lag",), ("s",), label=label, scale=lag_s)
+
+    def smoothed(values: FloatArray, at: float) -> FloatArray:
+        here, after, before = (context.shifted(values, t) for t in (at, at + step, at - step))
+        return np.asarray(0.5 * (lag_s / step) ** 2 * (after - 2.0 * here + before))
+
+    early_s = -lag_s if sensor else lag_s
+    early, none = context.force - context.shifted(context.force, early_s), np.zeros_like(context.force)
+    of_force, of_rate = smoothed(context.force, early_s), smoothed(context.rate, 0.0)
+    own = (none, of_rate) if sensor else (of_force, none)
+    usual = 0.0 if DELAYS in label else USUAL_SMOOTHING
+    force = np.stack([early + usual * own[0], own[0], of_force], axis=2)
+    rate = np.stack([usual * own[1], own[1], of_rate], axis=2)
+    names, n = (f"{SENSORS[sensor].label}_lag", f"{SENSORS[sensor].label}_smoothing", BOTH), 1 if DELAYS in label else 3
+    return Variant(Distortion(force, rate).of(range(n)), names[:n], ("s",) * n, label=label, scale=lag_s)
 
 
 class AccelGyroTimeOffset(Effect):
