@@ -14,11 +14,10 @@ from confidence.sensor import lower, recorded
 from confidence.sessions import table
 from trihedron import calibrate
 from trihedron.api.planning import POSE_SETS
-from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
-from trihedron.estimate.gyroscope.turns import calibrate_turns
-from trihedron.records import Recording
+from trihedron.records import FindingCode, Recording
 from trihedron.simulate import scenario_by_name, simulate, table_turns
+from turns_alone import turned
 
 
 def calibrated(seed, **levels):
@@ -121,7 +120,8 @@ def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
     n_poses = len(motion.rests)
     up = [face for face in (1, -1, 2, -2, 3, -3) for _ in range(n_poses // 6)]
     result = calibrate(log, gravity_m_s2=G, method="faces", faces=[*up[:-1], 0])
-    assert np.isnan(result.accelerometer.quality.residual[-1])
+    left_out = next(one for one in result.findings if one.code is FindingCode.POSE_NOT_A_FACE)
+    assert f"poses {n_poses}" in left_out.seen
     with pytest.raises(ValueError, match=f"faces must be {n_poses} numbers"):
         calibrate(log, gravity_m_s2=G, method="faces", faces=up[:-1])
 
@@ -183,7 +183,7 @@ def test_the_plan_is_what_the_calibration_says_of_itself():
         for angle in (math.pi / 2, -math.pi / 2):
             n, still = int(2.0 * rate), int(20.0 * rate)
             zeros.append((clock, clock + still))
-            turns.append(Turn(clock + still, clock + still + n, axis + 1, angle))
+            turns.append((clock + still, clock + still + n, axis, angle))
             block = np.zeros((still + n, 3))
             t = (np.arange(n) + 0.5) / n
             block[still:, axis] = angle / 2.0 * 30 * t**2 * (1 - t) ** 2
@@ -191,11 +191,12 @@ def test_the_plan_is_what_the_calibration_says_of_itself():
             clock += still + n
     gyro = np.vstack(pieces) + rng.normal(size=(clock, 3)) * N * math.sqrt(rate)
     recording = Recording(np.arange(clock) / rate, None, gyro, rate)
-    found, _ = calibrate_turns(recording, turns, zeros)
+    *spans, axes, angles = zip(*turns, strict=True)
+    _, _, sigma_S, sigma_b = turned(recording, list(zip(*spans, strict=True)), zeros, angles, list(axes), 1.0, 1e-6)
     design = design_turns([90.0, -90.0], 2.0, 120.0, N)
     # The calibration measures N itself, from 240 blocks of half a second: to 3 %.
-    np.testing.assert_allclose(np.diag(found.sigma_S), design.scale, rtol=0.12)
-    np.testing.assert_allclose(found.sigma_b, design.bias, rtol=0.12)
+    np.testing.assert_allclose(np.diag(sigma_S), design.scale, rtol=0.12)
+    np.testing.assert_allclose(sigma_b, design.bias, rtol=0.12)
 
 
 def test_what_poses_are_worth_is_what_least_squares_of_gravity_says():

@@ -15,8 +15,6 @@ import trihedron
 from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.api.identifying import allan, noise_of_curve
 from trihedron.cli import main
-from trihedron.estimate.gyroscope.turn_angles import Turn
-from trihedron.estimate.gyroscope.turns import calibrate_turns
 from trihedron.estimate.noise.streamed import stream_noise
 from trihedron.estimate.session import solved as of_session
 from trihedron.estimate.session.fit import refitted, solve_session
@@ -27,6 +25,7 @@ from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate
 from trihedron.units import RateUnit
 from true_segments import codes
+from turns_alone import turned
 
 
 def calibrated(capsys, *arguments, status=0):
@@ -221,21 +220,21 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
         rough = block[first:last, axis].sum() / 100.0
         zeros.append((start, start + 2000))
         angle = math.copysign(math.radians(angles[name]), rough)
-        turns.append(Turn(start + first, start + last, axis + 1, angle))
+        turns.append((start + first, start + last, axis, angle))
         blocks.append(block)
         start += len(block)
     gyroscope = np.concatenate(blocks)
     recording = Recording(np.arange(len(gyroscope)) / 100.0, None, gyroscope, 100.0, gyroscope_unit=RateUnit.DEG_S)
-    found, findings = calibrate_turns(recording, turns, zeros)
+    *spans, axes, known = zip(*turns, strict=True)
+    S, *_ = turned(recording, list(zip(*spans, strict=True)), zeros, known, list(axes), math.pi / 180.0)
     # The readings are in deg/s already, so each scale is the ratio of the reference angle to the integrated one.
-    scale = np.diag(found.S) * 180.0 / math.pi
+    scale = np.diag(S) * 180.0 / math.pi
     assert np.abs(scale - 1.0).max() < 0.02
-    assert not any(f.code is FindingCode.TURN_NOT_A_MULTIPLE for f in findings)
     for turn, zero in zip(turns, zeros, strict=True):
         rest = gyroscope[zero[0] : zero[1]].mean(axis=0)
-        seen = (gyroscope[turn.start : turn.stop] - rest).sum(axis=0) / 100.0
+        seen = (gyroscope[turn[0] : turn[1]] - rest).sum(axis=0) / 100.0
         # Back through the calibration: the reference angle, within the drift of the bias over 5 s.
-        assert abs((found.S @ seen)[turn.axis] - turn.angle_rad) < math.radians(0.5)
+        assert abs((S @ seen)[turn[2]] - turn[3]) < math.radians(0.5)
 
 
 N, RATE = 360_000, 100.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -11,29 +12,21 @@ import numpy as np
 
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, require_poses, segments_of
-from trihedron.arrays import FloatArray
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.nonlinear_shapes import with_shapes
-from trihedron.estimate.accelerometer.norm import calibrate_few_faces, calibrate_norm
-from trihedron.estimate.gravity_circle import opposite_headings
+from trihedron.estimate.accelerometer.norm import calibrate_norm
+from trihedron.estimate.case_session import in_case_frame
 from trihedron.estimate.gyroscope.common_scale import scale_findings, without_first_scale
 from trihedron.estimate.gyroscope.lost_samples import missing_samples, relative_sigma
 from trihedron.estimate.gyroscope.measurements import GAP_STEPS
-from trihedron.estimate.gyroscope.stated_turns import on_stated_turns
-from trihedron.estimate.gyroscope.turn_angles import (
-    SCALE_TOLERANCE,
-    TurnAngleUnknownError,
-    moves_on_faces,
-    resting_spans,
-    turns_on_faces,
-)
-from trihedron.estimate.gyroscope.turns import calibrate_turns
+from trihedron.estimate.gyroscope.stated_turns import TableTurns, by_quarters, on_stated_turns, table_turns
+from trihedron.estimate.gyroscope.turn_angles import scale_of_stated
 from trihedron.estimate.gyroscope.turntable import on_turntable
-from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves, scale_by_gravity
+from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves
 from trihedron.estimate.session.start import GyroClippedError
-from trihedron.estimate.verification import reference_findings, sense_findings
+from trihedron.estimate.verification import reference_findings
 from trihedron.estimate.verified_static_rate import with_static_rate
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
@@ -41,7 +34,6 @@ from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
 from trihedron.records.words import words
 from trihedron.sensor_model import in_frame
-from trihedron.units import rate_to_si
 
 if TYPE_CHECKING:
     from trihedron.api.referring import AnyReference
@@ -155,8 +147,8 @@ def calibrate(
             grave = [f"{one.seen} {one.action}" for one in recording.findings if one.severity is Severity.SERIOUS]
             raise InputError(" ".join((*grave, *(["As it is:"] if grave else []), str(error)))) from None
     calibration = in_frame(calibration, wanted)
-    if turns_deg is not None and method != "faces":
-        calibration = on_stated_turns(calibration, recording, segments, turns_deg)
+    if turns_deg is not None and method != "faces" and calibration.gyroscope is not None:
+        calibration = _on_turns(calibration, recording, segments, turns_deg)[0]
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
     of_fit = _of_fit(calibration, recording, segments)
@@ -198,7 +190,7 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     possible = [one.numbers["sigma_scale"] for one in fitted if one.code is FindingCode.LOSSES_POSSIBLE]
     sigma_scale = min([relative_sigma(gyro.covariance, gyro.S), *possible])
     missing = tuple(missing_samples(recording, segments, sigma_scale))
-    of_gyro = (*scale_findings(gyro.S, sigma_scale, recording), *sense_findings(calibration, recording, segments))
+    of_gyro = scale_findings(gyro.S, sigma_scale, recording)
     # Losses detected in the motion are not also possible ones of the fit.
     fitted = tuple(one for one in fitted if not (missing and one.code is FindingCode.LOSSES_POSSIBLE))
     return (*fitted, *of_gyro, *missing)
@@ -259,42 +251,52 @@ def _by_faces(
     turns_deg: Sequence[float] | None,
     nominal: float | None,
 ) -> Calibration:
-    mean, sigma_mean = segments.accelerometer_mean, segments.accelerometer_sigma_mean
+    mean, sigma_mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean, segments.norm_sigma
     unit = recording.accelerometer_unit
     assert mean is not None
     assert sigma_mean is not None
     up = faces_up(mean, unit, faces)
     shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
-    stated = () if turns_deg is None else turns_deg
-    opposite = opposite_headings(recording, segments, moves_on_faces(segments, up), stated)
+    by_faces = partial(calibrate_faces, mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared)
     try:
-        accelerometer, found = calibrate_faces(
-            mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
-        )
+        accelerometer, found = by_faces()
     except INPUT_ERRORS:
-        if recording.gyroscope is None or turns_deg is None or segments.norm_sigma is None:
+        if recording.gyroscope is None or turns_deg is None or sigma is None:
             raise
         # Stated turns about stated faces determine the gyro even without a full accelerometer.
-        accelerometer, found = calibrate_few_faces(mean, segments.norm_sigma, gravity, unit)
+        accelerometer, _ = by_faces(is_square=True)
+        _, found = calibrate_norm(mean, sigma, gravity, raw_unit=unit)
     alone = _alone(accelerometer, found, "case", gravity, source, recording)
     if recording.gyroscope is None:
         return alone
-    turns = turns_on_faces(recording, segments, up, turns_deg)
-    scale: FloatArray | float | None = nominal
-    tolerance = SCALE_TOLERANCE
-    if nominal is None and turns_deg is None and rate_to_si(recording.gyroscope_unit) is None:
-        by_gravity = scale_by_gravity(recording, segments, accelerometer, gravity)
-        if by_gravity is not None:
-            scale, tolerance = by_gravity
+    # The lean of the table is found anew beside moves.
+    found = tuple(one for one in found if one.code is not FindingCode.TABLE_TILT)
     try:
-        gyroscope, more = calibrate_turns(
-            recording, turns, resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
-        )
+        stated = None
+        if turns_deg is not None:
+            turns = table_turns(recording, segments, accelerometer, turns_deg)
+            stated = scale_of_stated(turns.measured.turned(), turns.angles[:, None] * turns.up)
+        # Residuals of faces are leans of the table, which poses and moves do not have.
+        near = replace(alone, accelerometer=replace(accelerometer, quality=None), findings=found)
+        session = replace(calibrate_joint(recording, segments, near, nominal, stated), frame="lower")
+        return in_case_frame(*_on_turns(session, recording, segments, turns_deg), recording, segments, up)
     except INPUT_ERRORS as error:
         if turns_deg is not None:
             raise
-        return _without_gyroscope(alone, error, of_faces=True)
-    return _together(alone, gyroscope, more)
+        return _without_gyroscope(alone, error)
+
+
+def _on_turns(
+    session: Calibration, recording: Recording, segments: Segments, turns_deg: Sequence[float] | None
+) -> tuple[Calibration, TableTurns]:
+    """The calibration of poses and moves updated with turns on a table, and these; multiples of 90° where the user
+    states no angles."""
+    assert session.gyroscope is not None
+    turns = table_turns(recording, segments, session.accelerometer, turns_deg)
+    if turns_deg is None:
+        turns, said = by_quarters(turns, session)
+        session = replace(session, findings=(*session.findings, *said))
+    return on_stated_turns(session, recording, segments, turns) if turns.moves else (session, turns)
 
 
 def _alone(
@@ -321,14 +323,10 @@ def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) ->
     return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*alone.findings, *found))
 
 
-def _without_gyroscope(alone: Calibration, error: Exception, *, of_faces: bool = False) -> Calibration:
-    if isinstance(error, TurnAngleUnknownError):
-        finding = Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)
-    elif isinstance(error, GyroClippedError):
+def _without_gyroscope(alone: Calibration, error: Exception) -> Calibration:
+    if isinstance(error, GyroClippedError):
         finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "clipped", n_lost=error.n_lost, n_moves=error.n_moves)
     else:
         why = words("because", sentence=str(error))
-        finding = Finding.of(
-            FindingCode.GYROSCOPE_LEFT_OUT, "no-known-turns" if of_faces else "not-calibrated", why=why
-        )
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=why)
     return replace(alone, findings=(*alone.findings, finding))

@@ -195,20 +195,6 @@ def reference_findings(calibration: Calibration, recording: Recording, segments:
         )
 
 
-def sense_findings(calibration: Calibration, recording: Recording, segments: Segments) -> Iterator[Finding]:
-    """Finding where the moves of the log itself contradict the sense of the stated turns that a gyro was fitted to."""
-    gyro = calibration.gyroscope
-    if gyro is None or gyro.method != "turns" or not segments.moves:
-        return
-    measured = measure_moves(recording, segments, calibration.accelerometer)
-    stated, other = (
-        _carried(calibration, replace(gyro, S=sign * gyro.S), measured, segments).angle_deg for sign in (1.0, -1.0)
-    )
-    if _is_larger(stated, other):
-        rms, rms_other = rms_of(stated), rms_of(other)
-        yield Finding.of(FindingCode.LEFT_HANDED, "turns-reversed", rms_deg=rms, rms_other_deg=rms_other)
-
-
 def _is_larger(errors: FloatArray, others: FloatArray) -> bool:
     """Whether squared errors (n,) or (n, k) exceed ``others`` of the same poses or moves: paired one-sided t test."""
     more = errors**2 - others**2

@@ -34,8 +34,6 @@ def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
         rows.append(("gravity error in static poses", f"{_norm_words(quality)}; {AT_REST}"))
     elif angles_of(quality):
         rows.append(("tilt error after a rotation", f"{_angle_words(quality)}; {AFTER_MOVES}"))
-    else:
-        rows.append(("residual", _angle_words(quality)))
     if quality.static_rate_rms is not None and quality.static_rate_floor is not None:
         seen, noise = (degrees_from_radians(x) for x in (quality.static_rate_rms, quality.static_rate_floor))
         said = f"{plain_number(seen)} °/s rms {HELD_OUT}; noise alone {plain_number(noise)} °/s; {AT_REST}"
@@ -86,22 +84,16 @@ def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
 
 
 def _angle_words(quality: FitQuality) -> str:
-    angles = angles_of(quality)
-    if angles:
-        # The one of the headline first, as for the accelerometer.
-        parts = [
-            f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles[::-1]
-        ]
-        assert quality.angle_deg is not None
-        n_moves, n_counted = len(quality.angle_deg), int(counted_moves(quality).sum())
-        if n_counted < n_moves:
-            parts[-1] += f" ({n_counted} of {n_moves} moves, the others excluded)"
-        parts.append(f"noise alone {plain_number(move_floor(quality))}° rms")
-        return "; ".join(parts)
-    if quality.dof <= 0:
-        return "none: as many parameters as measured turns, so the fit cannot be judged"
-    seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms, quality.floor))
-    return f"error of a turn's angle {seen}° rms; noise alone {noise}°"
+    # The one of the headline first, as for the accelerometer.
+    parts = [
+        f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}"
+        for label, rms, worst in angles_of(quality)[::-1]
+    ]
+    assert quality.angle_deg is not None
+    n_moves, n_counted = len(quality.angle_deg), int(counted_moves(quality).sum())
+    if n_counted < n_moves:
+        parts[-1] += f" ({n_counted} of {n_moves} moves, the others excluded)"
+    return "; ".join([*parts, f"noise alone {plain_number(move_floor(quality))}° rms"])
 
 
 def move_floor(quality: FitQuality) -> float:

@@ -1,7 +1,6 @@
 """Which axis of the case points up in a pose."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,21 +14,6 @@ from trihedron.session.rounding import undithered_axes
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 
-@dataclass(frozen=True, eq=False)
-class Placements:
-    """One mean (n, 3), covariance ``noise`` (n, 3, 3) and face (n,) for each time that the case was set down.
-
-    ``scatter`` is the variance [raw²] per horizontal component of the headings on one face, ``None`` where noise
-    explains it; it is not in ``noise`` and averages over ``n_headings`` (n,).
-    """
-
-    means: FloatArray
-    noise: FloatArray
-    faces: IntArray
-    scatter: float | None
-    n_headings: FloatArray
-
-
 def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
     """Variance (3,) [raw²] of the rounding error that pose means at one place inside an LSB share.
 
@@ -41,50 +25,7 @@ def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
     return np.where(undithered_axes(step, sigma), np.min(sigma_mean, axis=0) ** 2, 0.0)
 
 
-def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: FloatArray | None = None) -> Placements:
-    """Merge the poses of every placement.
-
-    ``shared`` (3,) raw² is the part of the noise that equal readings share (rounding): the vertical axis reads the same
-    at every heading, a horizontal axis at every return to a heading.
-
-    Poses of one placement share its tilt: as independent poses, their agreement would suggest a level table. Their
-    scatter beyond noise is a tilt that rotates with the case and is added to the error of their mean. A repeated
-    heading repeats the same tilt and counts once.
-    """
-    start = np.flatnonzero(np.concatenate([[True], faces[1:] != faces[:-1]]))
-    stop = np.concatenate([start[1:], [len(faces)]])
-    level = np.abs(direction_of(faces)) < 0.5
-    within, n_within = 0.0, 0
-    means, errors, n_headings, squares = [], [], [], 0.0
-    for a, b in zip(start, stop, strict=True):
-        across = level[a]
-        centre = values[a:b].mean(axis=0)
-        within += float(np.sum((values[a:b] - centre)[:, across] ** 2))
-        n_within += int(b - a - 1)
-        heading = _headings(values[a:b, across], noise[a:b][:, across][:, :, across])
-        n = int(heading.max()) + 1
-        of_heading = np.array([values[a:b][heading == k].mean(axis=0) for k in range(n)])
-        count = np.bincount(heading, minlength=n)[heading]
-        means.append(of_heading.mean(axis=0))
-        share = count[:, None, None] * n
-        error = np.sum(noise[a:b] / share**2, axis=0)
-        if shared is not None:
-            once = np.where(across, shared / n, shared)
-            error += np.diag(once) - np.sum(np.diag(shared) / share**2, axis=0)
-        errors.append(error)
-        squares += float(np.sum((of_heading - means[-1])[:, across] ** 2))
-        n_headings.append(n)
-    merged, widened = np.array(means), np.array(errors)
-    freedom = 2.0 * n_within
-    expected = float(np.mean(np.einsum("nii->n", noise))) / 3.0
-    limit = expected * float(probability.chdtri(freedom, verdict.SIGNIFICANCE)) if freedom else np.inf
-    apart = 2.0 * float(np.sum(np.array(n_headings) - 1))
-    if within <= limit or apart == 0.0:
-        return Placements(merged, widened, faces[start], None, np.array(n_headings, dtype=np.float64))
-    return Placements(merged, widened, faces[start], squares / apart, np.array(n_headings, dtype=np.float64))
-
-
-def _headings(values: FloatArray, noise: FloatArray) -> IntArray:
+def headings(values: FloatArray, noise: FloatArray) -> IntArray:
     """Heading number (n,) of each pose (n, 2): that of the first earlier pose with the same reading within noise."""
     limit = float(probability.chdtri(2, verdict.SIGNIFICANCE))
     out = np.zeros(len(values), dtype=np.intp)
@@ -187,15 +128,15 @@ def given(up: Sequence[int], n: int) -> IntArray:
     return faces.astype(np.int64)
 
 
-def check_sufficient(faces: IntArray) -> None:
-    """Check for four faces of all three axes, which the twelve parameters need.
+def check_sufficient(faces: IntArray, fewest: int) -> None:
+    """Check for the ``fewest`` faces, of all three axes; the twelve parameters need four.
 
     Raises ``InputError`` naming the missing faces.
     """
     present = {int(face) for face in faces if face}
     missing = [face for face in FACES if face not in present]
     axes = {abs(face) for face in present}
-    if len(axes) < 3 or len(present) < 4:
+    if len(axes) < 3 or len(present) < fewest:
         raise InputError(
             "these faces do not determine the accelerometer's twelve parameters; missing: "
             + ", ".join(face_in_words(face) for face in missing)
@@ -212,35 +153,5 @@ def left_out(faces: IntArray, values: FloatArray) -> Iterator[Finding]:
         n_left_out=len(left),
         n_poses=len(values),
         largest_tilt_deg=LARGEST_TILT_DEG,
-        poses=left.tolist(),
+        poses=(left + 1).tolist(),
     )
-
-
-# Effect on the faces' readings of a table that is not level, or a case that does not lie flat (docs/model.md, 2).
-
-
-FREE_HEADINGS = 3
-"""Number of headings that stay free when faces on one tilted table do not contradict each other at all: the heading of
-each opposite face is such that its tilt cancels."""
-
-
-def tilted(noise: FloatArray, faces: IntArray, S_a: FloatArray, g: float, tilt_rad: float | FloatArray) -> FloatArray:
-    """Covariances (n, 3, 3) of raw means plus a horizontal error of ``g tilt`` rms per component (eq. 9).
-
-    ``tilt_rad`` [rad] is a number or (n,).
-    """
-    unit = direction_of(faces)
-    horizontal = np.eye(3) - unit[:, :, None] * unit[:, None, :]
-    size2 = np.broadcast_to((g * np.asarray(tilt_rad)) ** 2, len(noise))
-    return np.asarray(noise + size2[:, None, None] * np.einsum("ij,njk,lk->nil", S_a, horizontal, S_a))
-
-
-def widened(dof: int, n_placements: int) -> float:
-    """Factor on standard uncertainties from a tilt with few degrees of freedom, so that 1.96 of them cover 95 %.
-
-    Where the tilts of placements are independent, their contradictions have ``dof`` degrees of freedom. One tilted
-    table with the case at arbitrary headings is harder to detect: equal tilts cancel at some headings. The probability
-    that the contradictions are below a fraction s of the tilt falls only as s^(n - 3).
-    """
-    free = max(min(dof, n_placements - FREE_HEADINGS), 1)
-    return float(probability.stdtrit(free, 0.025) / probability.ndtri(0.025))

@@ -1,9 +1,7 @@
-"""Method 1: the faces of the case on a level table (docs/model.md, section 2)."""
-
-from __future__ import annotations
+"""Method 1: the faces of the case on a table (docs/model.md, section 2)."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,53 +9,23 @@ import numpy.typing as npt
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
 from trihedron.estimate.accelerometer import face_poses, verdict
-from trihedron.estimate.accelerometer.face_poses import placements
+from trihedron.estimate.accelerometer.face_poses import direction_of
 from trihedron.estimate.accelerometer.norm import checked_gravity, norm_residual, pose_means
-from trihedron.estimate.gravity_circle import OppositeHeadings, with_opposite
-from trihedron.estimate.known_vectors import KnownFit, KnownVectors, fit_known
+from trihedron.estimate.case_frame import TABLE, CaseFit, CaseRows, OnFaces, across_faces, fit_case, spread_over
 from trihedron.records import Finding, FindingCode, FitQuality, Observability, SensorCalibration, Severity
 from trihedron.records.words import words
-from trihedron.sensor_model import other_form, other_form_jacobian
-from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
-METHOD = "faces of the case on a level table"
-LARGEST_TILT_RAD = 0.5
-"""Largest tilt that is estimated: no case stands on a table that leans by 29°."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Estimate:
-    """Fit of the distort direction ``a' = S_a f + b_a``; ``tilt_rad`` is the rms tilt added to each variance."""
-
-    fit: KnownFit
-    covariance: FloatArray
-    tilt_rad: float
-    chi2_noise: float
-
-    def residual_m_s2(self, seen: _Faces) -> FloatArray:
-        """(n, 3) residuals of the readings in the body frame."""
-        residual = seen.rows().residual(self.fit.S_a, self.fit.b_a)
-        return np.asarray(np.linalg.solve(self.fit.S_a, residual.T).T)
-
-
-@dataclass(frozen=True, eq=False)
-class _Faces:
-    """Readings ``values`` (n, 3) with their ``noise`` (n, 3, 3), the face (n,) that is up in each, and |g|."""
-
-    values: FloatArray
-    noise: FloatArray
-    faces: IntArray
-    g: float
-
-    def rows(self) -> KnownVectors:
-        """The readings as those of gravity."""
-        vectors = self.g * face_poses.direction_of(self.faces)
-        return KnownVectors(self.values, vectors, np.ones(len(vectors)), self.noise, np.zeros((len(vectors), 3, 0)))
-
-    def tilted(self, S_a: FloatArray, tilt_rad: float | FloatArray) -> _Faces:
-        """The readings with the variance of a tilt of ``tilt_rad`` rms in every pose."""
-        return replace(self, noise=face_poses.tilted(self.noise, self.faces, S_a, self.g, tilt_rad))
+METHOD = "faces of the case on a level table, least squares"
+PASSES = 3
+"""Fits, each with the noise by the scale of the one before, which is known to some percent at first."""
+SQUARE = 0.05
+"""Standard error of an angle between axes of a triad and of the case that are not measured."""
+ALIKE = 0.9
+"""Part of the rounding variance of equal readings that is the same error: some are nearer to the edge of a code."""
+FREE_HEADINGS = 3
+"""Number of headings that stay free when faces on one tilted table do not contradict each other at all: the heading of
+each opposite face is such that its tilt cancels."""
 
 
 def calibrate_faces(
@@ -68,18 +36,19 @@ def calibrate_faces(
     up: Sequence[int] | None = None,
     raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
     shared: FloatArray | None = None,
-    opposite: OppositeHeadings | None = None,
+    is_square: bool = False,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Accelerometer triad from poses with one axis of the case along the vertical.
 
-    ``a'[i] = S_a (±|g| e) + b_a + δa[i]`` by weighted least squares over all poses; faces may repeat or be missing
+    ``S a'[i] + b = ±|g| e`` by weighted least squares over all poses; faces may repeat or be missing
     (eq. 7; for six faces it is eq. 8). ``means`` (n, 3) are raw, ``sigma_means`` as in ``calibrate_norm``; ``shared``
-    (3,) [raw²] is the part of their variance that equal readings share (rounding), ``opposite`` the readings at the
-    opposite headings, determined from whole turns.
+    (3,) [raw²] is the part of their variance that equal readings share (rounding).
 
-    Faces that contradict each other beyond their noise were not level: the rms tilt per pose that makes them consistent
-    is estimated, reported (TABLE_TILT) and added to the variance of each pose as a horizontal error. A tilt common to
-    all poses in the axes of the case is not observable; it rotates the body frame against the case.
+    Faces that contradict each other beyond their noise were not level: the rms lean of the table, which is common to
+    the poses at one heading, is estimated, reported (TABLE_TILT) and added to the variance as a horizontal error. A
+    lean common to all poses in the axes of the case is not observable; it rotates the body frame against the case.
+
+    With ``is_square`` three faces of the three axes do: the axes of the triad are those of the case to ``SQUARE``.
 
     ``up`` (n,) of ±1, ±2, ±3 is the axis of the case that points up in each pose (0: the pose is excluded). Without it
     the axis with the largest reading is taken, and a positive reading is taken as up: handedness is then not tested.
@@ -89,113 +58,122 @@ def calibrate_faces(
     g, unit = checked_gravity(gravity_m_s2), AccelerationUnit(raw_unit)
     faces = face_poses.faces_up(values, unit, up)
     used = np.flatnonzero(faces)
-    face_poses.check_sufficient(faces[used])
-    estimate = _estimate_placements(values, noise, faces, g, shared, opposite)
-    S_a, b_a = estimate.fit.S_a, estimate.fit.b_a
-    S, b = other_form(S_a, b_a)
-    seen = _Faces(values[used], noise[used], faces[used], g)
-    widened = fit_known(seen.tilted(S_a, estimate.tilt_rad).rows())
+    face_poses.check_sufficient(faces[used], 3 if is_square else 4)
+    origin, n = values[used].mean(axis=0), len(used)
+    seen = OnFaces(values[used] - origin, noise[used], faces[used], np.full(n, g), np.ones(n))
+    # Each axis of the triad near that of the case; or all of S free.
+    force = g * direction_of(seen.faces)
+    centred = force - force.mean(axis=0)
+    start = np.diag(np.sum(seen.values * centred, axis=0) / np.sum(seen.values**2, axis=0))
+    values_of = np.append(start.ravel(), force.mean(axis=0))
+    across = np.append(1.0 - np.eye(3).ravel(), np.zeros(3)) > 0.0
+    prior = np.diag(np.where(across & is_square, SQUARE * np.abs(start).max(), 0.0) ** 2)
+    free = np.eye(12)[:, ~(across & is_square)]
+    for _ in range(PASSES):
+        rows = _rows(seen, values_of[:9].reshape(3, 3), shared)
+        fit = fit_case(values_of, prior, free, rows)
+        values_of = fit.values
+    # Readings about their mean: counts around 32768 would cost the normal equations ten digits.
+    S, moved = fit.values[:9].reshape(3, 3), np.eye(12)
+    moved[9:, :9] = -np.kron(np.eye(3), origin)
+    b, lean = fit.values[9:] - S @ origin, fit.sizes.get(TABLE, 0.0)
+    residual = seen.values @ S.T + fit.values[9:] - g * direction_of(seen.faces)
     apart = np.full((len(values), 2), np.nan)
-    apart[used] = _held_out(seen, estimate, widened)
+    error, covariance = fit.left_out(np.arange(3 * n).reshape(n, 3))
+    # The component along the axis that is up is the first; a norm that is too large has a positive residual.
+    apart[used] = g * np.column_stack([-np.sign(seen.faces) * error[:, 0], np.sqrt(covariance[:, 0, 0])])
     findings = [
         *face_poses.left_out(faces, values),
-        *_tilt_findings(seen, estimate, used),
+        *tilt_findings(lean, fit, seen.faces, residual, used),
         *verdict.model_findings(S, unit),
-        *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), estimate.fit.dof),
+        *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), fit.dof),
     ]
-    jacobian = other_form_jacobian(S_a, b_a)
     sensor = SensorCalibration(
         S=S,
         b=b,
-        covariance=jacobian @ estimate.covariance @ jacobian.T,
+        covariance=moved @ _with_doubt(fit, rows, lean, g) @ moved.T,
         raw_unit=unit.value,
         si_unit="m/s^2",
-        method=METHOD + ", least squares",
-        quality=_quality(seen, estimate, faces != 0, apart),
-        observability=_observability(widened, faces[used]),
+        method=METHOD,
+        quality=_quality((S, b), replace(seen, values=values[used]), residual, fit, faces != 0, apart),
+        observability=_observability(fit, rows, faces[used]),
     )
     return sensor, tuple(findings)
 
 
-def _estimate_placements(
-    values: FloatArray,
-    noise: FloatArray,
-    faces: IntArray,
-    g: float,
-    shared: FloatArray | None,
-    opposite: OppositeHeadings | None,
-) -> _Estimate:
-    """Fit with one mean for each placement of the case: poses between turns on one face share their tilt."""
-    placed = placements(*with_opposite(values, noise, faces, opposite), shared)
-    if len(placed.means) == np.count_nonzero(faces):
-        used = faces != 0
-        return _estimate(_Faces(values[used], noise[used], faces[used], g))
-    seen = _Faces(placed.means, placed.noise, placed.faces, g)
-    if placed.scatter is None:
-        return _estimate(seen)
-    S_a = fit_known(seen.rows()).S_a
-    tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
-    # Readings half a turn apart have opposite tilts, which cancel in their mean.
-    if opposite is not None and len(opposite.pose) == len(placed.means):
-        return _with_doubt(_estimate(seen), tilt2, 0.0)
-    # Misalignments couple the tilt into the reading of the vertical axis.
-    return _with_doubt(_estimate(seen.tilted(S_a, np.sqrt(tilt2 / placed.n_headings))), tilt2, g)
+def _rows(seen: OnFaces, S: FloatArray, shared: FloatArray | None) -> CaseRows:
+    """All components of the poses, along the axis that is up first; errors that poses of one placement, or of one of
+    its headings, have in common."""
+    n = len(seen.faces)
+    across = across_faces(seen.faces)
+    axes = np.column_stack([np.abs(seen.faces) - 1, across])
+    placement = np.cumsum(np.diff(seen.faces, prepend=0) != 0)
+    heading = np.zeros(n, dtype=np.int64)
+    for of in (placement == k for k in range(1, placement[-1] + 1)):
+        # A repeated heading repeats the same lean.
+        which = across[of][0]
+        heading[of] = face_poses.headings(seen.values[of][:, which], seen.noise[of][:, which][:, :, which])
+    owner = np.unique(np.column_stack([placement, heading]), axis=0, return_inverse=True)[1].ravel()
+    across_only = np.broadcast_to(np.vstack([np.zeros(2), np.eye(2)]), (n, 3, 2))
+    rows = seen.rows(S, axes, 0, 12)
+    if shared is not None:
+        # The vertical axis reads the same at every heading, a horizontal one at every return to a heading.
+        for i, k in np.ndindex(n, n):
+            both = np.where(axes[i] == axes[i, 0], placement[i] == placement[k], owner[i] == owner[k])
+            if i != k and np.any(both):
+                blocks = slice(3 * i, 3 * i + 3), slice(3 * k, 3 * k + 3)
+                of = (S[axes[i]][:, axes[i]] * (ALIKE * both * shared[axes[i]])) @ S[axes[i]][:, axes[i]].T
+                rows.noise[blocks] += of / seen.sizes[0] ** 2
+    return replace(rows, leans={TABLE: spread_over(across_only, owner)})
 
 
-def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
-    """Add second-order errors of a tilt to the covariance; ``tilt2`` [rad²] is the mean square tilt per component.
+def _with_doubt(fit: CaseFit, rows: CaseRows, lean: float, g: float) -> FloatArray:
+    """The covariance with second-order errors of a lean, and with Student's tails where few directions show it.
 
-    A tilted face reads ``g cos t``: the scale may be too small by ``tilt2``. Misalignments are uncertain by the tilt:
-    coupled into the vertical axis it changes the bias by up to ``g tilt2``. Neither is corrected: scatter may have
-    other causes."""
-    S_a = estimate.fit.S_a
-    scale = np.concatenate([S_a.ravel(), np.zeros(3)])
-    covariance = estimate.covariance + np.outer(scale, scale) * tilt2**2
-    covariance[9:, 9:] += (g * tilt2) ** 2 * S_a @ S_a.T
-    return replace(estimate, covariance=covariance, tilt_rad=float(np.sqrt(estimate.tilt_rad**2 + tilt2)))
-
-
-def _estimate(seen: _Faces) -> _Estimate:
-    """Fit with the noise alone; if χ² rejects it, with the rms tilt per pose that makes χ² equal its dof."""
-    fit = fit_known(seen.rows())
-    if fit.dof <= 0 or fit.chi2 <= probability.chdtri(fit.dof, verdict.SIGNIFICANCE):
-        return _Estimate(fit, fit.covariance, 0.0, fit.chi2)
-
-    def excess(tilt: float) -> float:
-        return fit_known(seen.tilted(fit.S_a, tilt).rows()).chi2 - fit.dof
-
-    from scipy.optimize import brentq
-
-    tilt = float(brentq(excess, 0.0, LARGEST_TILT_RAD)) if excess(LARGEST_TILT_RAD) < 0.0 else LARGEST_TILT_RAD
-    widened = fit_known(seen.tilted(fit.S_a, tilt).rows())
-    # A tilt estimated with few degrees of freedom has Student's tails: 1.96 standard uncertainties shall cover 95 %.
-    covariance = widened.covariance * face_poses.widened(fit.dof, len(seen.values)) ** 2
-    return _with_doubt(_Estimate(widened, covariance, 0.0, fit.chi2), tilt**2, seen.g)
+    A face that leans reads ``g cos t``: the scale may be too small by the square of the lean. Misalignments are
+    uncertain by the lean: coupled into the vertical axis it changes the bias by up to ``g`` times its square. Neither
+    is corrected: contradictions may have other causes.
+    """
+    if lean == 0.0:
+        return fit.covariance
+    n_headings = rows.leans[TABLE].shape[1] // 2
+    out = fit.covariance * widened(fit.dof, n_headings) ** 2
+    out += np.outer(fit.values, fit.values) * lean**4
+    out[9:, 9:] += (g * lean**2) ** 2 * np.eye(3)
+    return out
 
 
-def _held_out(seen: _Faces, estimate: _Estimate, widened: KnownFit) -> FloatArray:
-    """(n, 2) norm residual of each pose predicted by the others, and its standard error, m/s²."""
-    residual, covariance, _ = widened.left_out()
-    S, b = other_form(estimate.fit.S_a, estimate.fit.b_a)
-    force = seen.values @ S.T + b
-    along = directions_of(force) @ S
-    sigma2 = np.einsum("ni,nij,nj->n", along, covariance, along)
-    return np.column_stack([np.einsum("ni,ni->n", along, residual), np.sqrt(sigma2)])
+def widened(dof: int, n_headings: int) -> float:
+    """Factor on standard uncertainties from a lean with few degrees of freedom, so that 1.96 of them cover 95 %.
+
+    Where the leans of headings are independent, their contradictions have ``dof`` degrees of freedom. One leaning
+    table with the case at arbitrary headings is harder to detect: equal leans cancel at some headings. The probability
+    that the contradictions are below a fraction s of the lean falls only as s^(n - 3).
+    """
+    free = max(min(dof, n_headings - FREE_HEADINGS), 1)
+    return float(probability.stdtrit(free, 0.025) / probability.ndtri(0.025))
 
 
-def _quality(seen: _Faces, estimate: _Estimate, is_face: BoolArray, apart: FloatArray) -> FitQuality:
+def _quality(
+    fitted: tuple[FloatArray, FloatArray],
+    seen: OnFaces,
+    in_m_s2: FloatArray,
+    fit: CaseFit,
+    is_face: BoolArray,
+    apart: FloatArray,
+) -> FitQuality:
     """Norm residuals in sample and held out (NaN where no face), and χ² of the vectors."""
-    S, b = other_form(estimate.fit.S_a, estimate.fit.b_a)
-    in_m_s2 = estimate.residual_m_s2(seen)
+    S, b = fitted
     residual, sigma = (np.full(len(is_face), np.nan) for _ in range(2))
-    residual[is_face], sigma[is_face] = norm_residual(seen.values @ S.T + b, S, seen.noise, seen.g)
-    is_held, dof = np.isfinite(apart[:, 0]), estimate.fit.dof
+    g = float(seen.sizes[0])
+    residual[is_face], sigma[is_face] = norm_residual(seen.values @ S.T + b, S, seen.noise, g)
+    is_held, dof = np.isfinite(apart[:, 0]), fit.dof
     floor = np.einsum("ij,njk,ik->", S, seen.noise, S) / (3 * len(seen.values))
     return FitQuality(
         unit="m/s^2",
         residual=residual,
         sigma=sigma,
-        chi2=estimate.chi2_noise,
+        chi2=fit.chi2,
         dof=dof,
         rms=rms_of(in_m_s2),
         rms_dof=float(np.sqrt(np.sum(in_m_s2**2) / dof)) if dof > 0 else float("nan"),
@@ -207,29 +185,32 @@ def _quality(seen: _Faces, estimate: _Estimate, is_face: BoolArray, apart: Float
     )
 
 
-def _tilt_findings(seen: _Faces, estimate: _Estimate, used: IntArray) -> Iterator[Finding]:
-    """Finding where faces contradict each other beyond noise, with the tilt and the pose of the worst residual."""
-    if estimate.tilt_rad == 0.0:
+def tilt_findings(
+    lean: float, fit: CaseFit, faces: IntArray, residual: FloatArray, used: IntArray
+) -> Iterator[Finding]:
+    """Finding where faces contradict each other beyond noise, with the lean and the pose, of those ``used`` (n,), whose
+    ``residual`` (n, 3) across its face is the largest."""
+    if lean == 0.0:
         return
-    horizontal = estimate.residual_m_s2(seen)
-    horizontal[np.arange(len(used)), np.abs(seen.faces) - 1] = 0.0
-    worst = int(np.argmax(np.linalg.norm(horizontal, axis=1)))
-    tilt_deg = degrees_from_radians(estimate.tilt_rad)
+    across = np.take_along_axis(residual, across_faces(faces), axis=1)
+    worst, tilt_deg = int(np.argmax(np.linalg.norm(across, axis=1))), degrees_from_radians(lean)
     yield Finding.of(
         FindingCode.TABLE_TILT,
-        chi2_per_dof=estimate.chi2_noise / estimate.fit.dof,
-        # Norms that agree say nothing of a tilt: it is then that of the faces' own turns.
-        is_by_heading=estimate.chi2_noise < estimate.fit.dof,
+        chi2_per_dof=fit.chi2 / fit.dof,
         severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else Severity.WARNING,
         tilt_deg=tilt_deg,
         pose=int(used[worst]) + 1,
-        face=face_poses.face_in_words(int(seen.faces[worst])),
+        face=face_poses.face_in_words(int(faces[worst])),
     )
 
 
-def _observability(widened: KnownFit, faces: IntArray) -> Observability:
-    """Observability of the twelve parameters by the fit with the tilt in its weights."""
-    s = widened.singular_values()
+def _observability(fit: CaseFit, rows: CaseRows, faces: IntArray) -> Observability:
+    """Observability of the twelve parameters by the fit with the lean in its weights."""
+    covariance = rows.noise.copy()
+    for name, size in fit.sizes.items():
+        covariance += size**2 * rows.leans[name] @ rows.leans[name].T
+    white = np.linalg.solve(np.linalg.cholesky(covariance), rows.slope)
+    s = np.linalg.svd(white / np.linalg.norm(white, axis=0), compute_uv=False)
     present = {int(face) for face in faces}
     missing = tuple(face_poses.face_in_words(face) for face in face_poses.FACES if face not in present)
     return Observability(

@@ -3,6 +3,8 @@
 import numpy as np
 
 from trihedron import _core
+from trihedron.estimate.accelerometer.norm import N_PARAMETERS
+from trihedron.estimate.accelerometer.poses import PoseDesign
 from trihedron.probability import FALSE_ALARM
 from trihedron.records import Calibration, Finding, FindingCode, Segments
 from trihedron.sensor_model import correct
@@ -21,12 +23,11 @@ def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, 
     if fitted.quality is None or reading is None or len(fitted.quality.residual) != len(reading):
         return calibration.findings
     seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # excluded poses have no residual
-    shown = fitted.observability
-    is_determined = shown is None or shown.rank >= shown.n_parameters
-    if np.count_nonzero(is_known) < LEAST_POSES or not is_determined:
-        return calibration.findings
     up = directions_of(correct(reading, fitted.S, fitted.b))[is_known]
     g = calibration.gravity_m_s2
+    # Faces of a case on a level table have six lengths, whatever else determines S and b.
+    if len(up) < LEAST_POSES or PoseDesign.of(up, seen.sigma[is_known] / g).rank < N_PARAMETERS:
+        return calibration.findings
     _, odds, shift = _core.errors_of_lengths(up, seen.residual[is_known] / g, seen.sigma[is_known] / g)
     best = max(odds)
     if best - np.log(len(odds)) < -np.log(FALSE_ALARM):

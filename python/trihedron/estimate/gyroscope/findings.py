@@ -177,7 +177,7 @@ def _is_material(change: FloatArray, measured: MoveMeasurements) -> bool:
 
 
 def drift_findings(case: str, bias: FloatArray, excess: FloatArray, S: FloatArray) -> Iterator[Finding]:
-    """Finding where raw biases (n, 3) of ``case`` (poses, drifts, turns) differ: ``excess`` (3,) is their χ²."""
+    """Finding where raw biases (n, 3) of ``case`` (poses, drifts) differ: ``excess`` (3,) is their χ²."""
     dof = len(bias) - 1
     if dof < 1 or chdtrc(dof, float(excess.max())) > FALSE_ALARM / 3.0:
         return
@@ -223,6 +223,18 @@ def wrong_turn(
         angle_rad=angle_rad,
         axis=axis + 1,
         deviation_rad=abs(deviation_rad),
+    )
+
+
+def no_multiple(at: TurnName, seen_rad: float, axis: int) -> Finding:
+    """Finding on a turn that is none of the multiples of 90° it is read as."""
+    return Finding.of(
+        FindingCode.TURN_NOT_A_MULTIPLE,
+        "no-multiple",
+        turn=at.number,
+        at_s=at.at_s,
+        axis=axis + 1,
+        seen_rad=seen_rad,
     )
 
 

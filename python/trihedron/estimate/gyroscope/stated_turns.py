@@ -1,12 +1,14 @@
 """Turns on a table by stated angles, in any pose, as rows of a session: ``|S ∫w' dt + b Δt| = |φ|`` about any axis."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray, rms_of
-from trihedron.estimate.gyroscope.findings import TurnName, loose_turns, wrong_turn
+from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
+from trihedron.estimate.gyroscope.findings import TurnName, loose_turns, no_multiple, wrong_turn
 from trihedron.estimate.gyroscope.turn_angles import (
     MeasuredTurns,
     measure_turns,
@@ -16,7 +18,7 @@ from trihedron.estimate.gyroscope.turn_angles import (
 )
 from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates, not_fitted
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, FindingCode, Move, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import correct
 from trihedron.transforms import directions_of
 
@@ -24,61 +26,134 @@ SAME_POSE = 2.0 * np.sin(0.5 * np.radians(5.0))
 """Largest change of gravity in a turn on a table, relative: twice the table's tilt, which is two degrees at most."""
 
 
-def on_stated_turns(
-    calibration: Calibration, recording: Recording, segments: Segments, angles_deg: Sequence[float]
-) -> Calibration:
-    """The calibration of poses and moves updated with turns about the vertical by stated angles [°]; 0 excludes one.
+QUARTER, SLACK_RAD = 0.5 * np.pi, np.radians(10.0)
+"""A turn further than this from every multiple of 90° was not made against a wall."""
+SIGMAS = 3.0
+"""Standard errors of an angle within that, so that it is told which multiple it is."""
+LEAST_RAD = 0.2
+"""Smaller rotations about the vertical are no turns: the case was lifted and set down again."""
 
-    Angles are positive counter-clockwise seen from above. Turns that the others and the session contradict are
-    excluded; without a gyro nothing changes. Raises ``InputError`` when the numbers of turns and angles differ, or some
-    turned the other way.
+
+@dataclass(frozen=True, eq=False)
+class TableTurns:
+    """``moves`` that leave gravity where it is, with their ``names``, as ``measured``: turns by ``angles`` (k,) [rad]
+    about the vertical ``up`` (k, 3), counter-clockwise seen from above, which are stated or taken as such."""
+
+    names: list[TurnName]
+    moves: list[Move]
+    measured: MeasuredTurns
+    angles: FloatArray
+    up: FloatArray
+    is_stated: bool
+
+    def of(self, used: BoolArray) -> TableTurns:
+        """The turns ``used`` (k,)."""
+        kept = np.flatnonzero(used)
+        names, moves = [self.names[k] for k in kept], [self.moves[k] for k in kept]
+        return TableTurns(names, moves, self.measured.of(used), self.angles[used], self.up[used], self.is_stated)
+
+    def along(self, gyro: SensorCalibration) -> tuple[FloatArray, FloatArray]:
+        """Angles (k,) [rad] about the vertical by a gyro, and their standard errors."""
+        raw, times = self.measured.raw_angle, self.measured.duration_s
+        seen = np.sum(self.up * (raw @ gyro.S.T + np.outer(times, gyro.b)), axis=1)
+        slope = np.hstack([(self.up[:, :, None] * raw[:, None, :]).reshape(-1, 9), self.up * times[:, None]])
+        return seen, np.sqrt(np.einsum("ki,ij,kj->k", slope, gyro.covariance, slope))
+
+    def rates(self) -> StatedRates:
+        """The turns as mean rates of known size."""
+        measured, lasts_s = self.measured, self.measured.duration_s[:, None]
+        return StatedRates(
+            mean=measured.raw_angle / lasts_s,
+            covariance=(measured.var_rate / lasts_s + measured.bias_spread)[:, :, None] * np.eye(3),
+            shared=measured.hidden / lasts_s[:, :, None],
+            speeds=np.abs(self.angles) / measured.duration_s,
+            unit=1.0 / measured.duration_s,
+        )
+
+
+def table_turns(
+    recording: Recording, segments: Segments, accelerometer: SensorCalibration, angles_deg: Sequence[float] | None
+) -> TableTurns:
+    """The turns of a recording by stated angles [°], 0 of which excludes one; ``None``: all, by angles still unknown.
+
+    Raises ``InputError`` when the numbers of turns and angles differ.
     """
-    gyro = calibration.gyroscope
-    if gyro is None:
-        return calibration
-    at, measured, angles, axes = _turns(recording, segments, calibration.accelerometer, angles_deg)
-    lasts_s = measured.duration_s[:, None]
-    rates = StatedRates(
-        mean=measured.raw_angle / lasts_s,
-        covariance=(measured.var_rate / lasts_s + measured.bias_spread)[:, :, None] * np.eye(3),
-        shared=measured.hidden[:-1] / lasts_s[:, :, None],
-        speeds=np.abs(angles) / measured.duration_s,
-        unit=1.0 / measured.duration_s,
+    assert segments.accelerometer_mean is not None
+    up = directions_of(correct(segments.accelerometer_mean, accelerometer.S, accelerometer.b))
+    level = [one for one in segments.moves if np.linalg.norm(up[one.pose_after] - up[one.pose_before]) < SAME_POSE]
+    level = [one for one in level if one.stop - one.start >= 2]
+    if angles_deg is None:
+        known = [(k, move, 0.0) for k, move in enumerate(level, start=1)]
+    else:
+        known = stated(recording, level, angles_deg)
+    names = [TurnName(k, float(recording.time_s[move.start])) for k, move, _ in known]
+    moves = [move for _, move, _ in known]
+    measured = measure_turns(recording, moves, resting_spans(segments))
+    before = np.array([move.pose_before for move in moves], dtype=np.int64)
+    return TableTurns(
+        names, moves, measured, np.array([angle for *_, angle in known]), up[before], angles_deg is not None
     )
-    is_reversed = np.sum(axes * correct(rates.mean, gyro.S, gyro.b), axis=1) * angles < 0.0
+
+
+def by_quarters(turns: TableTurns, calibration: Calibration) -> tuple[TableTurns, list[Finding]]:
+    """The turns that a gyro shows to be multiples of 90°, with these angles, and findings on the others.
+
+    Those that are told by its uncertainty improve the scale by which larger ones are told.
+    """
+    gyro, n_told = calibration.gyroscope, -1
+    while True:
+        assert gyro is not None
+        seen, sigma = turns.along(gyro)
+        angles = QUARTER * np.round(seen / QUARTER)
+        is_told = SIGMAS * sigma < SLACK_RAD
+        is_used = is_told & (angles != 0.0) & (np.abs(seen - angles) < SLACK_RAD)
+        found = replace(turns, angles=angles).of(is_used)
+        if np.all(is_told) or np.count_nonzero(is_told) <= n_told or not found.moves:
+            break
+        n_told, gyro = int(np.count_nonzero(is_told)), found.rates().scattered_on(calibration).gyroscope(gyro)
+    is_wrong, axes = is_told & ~is_used & (np.abs(seen) > LEAST_RAD), np.argmax(np.abs(turns.up), axis=1)
+    said = [no_multiple(turns.names[k], seen[k], int(axes[k])) for k in np.flatnonzero(is_wrong)]
+    return found, said if np.all(is_told) else [*said, Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)]
+
+
+def on_stated_turns(
+    calibration: Calibration, recording: Recording, segments: Segments, turns: TableTurns
+) -> tuple[Calibration, TableTurns]:
+    """The calibration of poses and moves updated with turns on a table, and those that were used.
+
+    Turns that the others and the session contradict are excluded. Raises ``InputError`` when some turned the other way.
+    """
+    gyro, angles = calibration.gyroscope, turns.angles
+    assert gyro is not None
+    rates, axes = turns.rates(), np.argmax(np.abs(turns.up), axis=1)
+    is_reversed = turns.along(gyro)[0] * angles < 0.0
     if np.any(is_reversed) and not np.all(is_reversed):
         raise other_sense(is_reversed, angles)
-    wrong, either = contradicted(rates.on(calibration), rates.unit)
+    predicted = rates.on(calibration)
+    wrong, either = contradicted(predicted, rates.unit)
     is_used = ~np.isin(np.arange(len(angles)), wrong)
     updated = rates.of(is_used).scattered_on(calibration)
     if not updated.is_fitted:
-        return replace(calibration, findings=(*calibration.findings, not_fitted(rates, updated, is_turned=True)))
+        said = not_fitted(rates, updated, is_turned=True)
+        return replace(calibration, findings=(*calibration.findings, said)), turns.of(is_used)
     missed = (rates.predicted(updated.values)[0] - rates.speeds) / rates.unit
-    said = [
-        wrong_turn(at[k], angles[k], int(np.argmax(np.abs(axes[k]))), missed[k], is_excluded=k in wrong, is_stated=True)
+    found = [
+        wrong_turn(
+            turns.names[k], angles[k], int(axes[k]), missed[k], is_excluded=k in wrong, is_stated=turns.is_stated
+        )
         for k in (*wrong, *either)
     ]
-    said += loose_turns(updated.scatter)
+    found += loose_turns(updated.scatter)
+    # An error of a turn as large as it may be against a wall, which no other turn and no move contradicts.
+    alone = np.sqrt(predicted.left_out(np.arange(len(angles)), 0.0 * angles)[1]) / rates.unit > SLACK_RAD
+    if np.any(alone):
+        found.append(Finding.of(FindingCode.TURN_UNCHECKED, axes=sorted({int(axis) + 1 for axis in axes[alone]})))
     rms = rms_of(missed[is_used])
-    said.append(Finding.of(FindingCode.TURNTABLE, "turns", turns=int(np.count_nonzero(is_used)), rms_rad=rms))
+    found.append(Finding.of(FindingCode.TURNTABLE, "turns", turns=int(np.count_nonzero(is_used)), rms_rad=rms))
     if np.all(is_reversed):
-        said.append(Finding.of(FindingCode.LEFT_HANDED, "turns-against-moves", turns=len(angles)))
+        found.append(Finding.of(FindingCode.LEFT_HANDED, "turns-against-moves", turns=len(angles)))
     after = updated.of(calibration, recording, segments)
-    return replace(after, findings=(*calibration.findings, *said))
-
-
-def _turns(
-    recording: Recording, segments: Segments, accelerometer: SensorCalibration, angles_deg: Sequence[float]
-) -> tuple[list[TurnName], MeasuredTurns, FloatArray, FloatArray]:
-    """Moves that do not change gravity's direction, their stated angles (k,) [rad], and the vertical (k, 3) in each."""
-    assert segments.accelerometer_mean is not None
-    up = directions_of(correct(segments.accelerometer_mean, accelerometer.S, accelerometer.b))
-    is_level = [np.linalg.norm(up[one.pose_after] - up[one.pose_before]) < SAME_POSE for one in segments.moves]
-    known = stated(recording, [one for one, level in zip(segments.moves, is_level, strict=True) if level], angles_deg)
-    numbers, moves, angles = zip(*known, strict=True) if known else ((), (), ())
-    at = [TurnName(k, float(recording.time_s[move.start])) for k, move in zip(numbers, moves, strict=True)]
-    measured = measure_turns(recording, moves, resting_spans(segments))
-    return at, measured, np.array(angles), np.array([up[move.pose_before] for move in moves])
+    return replace(after, findings=(*calibration.findings, *found)), turns.of(is_used)
 
 
 def contradicted(found: Predicted, unit: FloatArray) -> tuple[list[int], list[int]]:

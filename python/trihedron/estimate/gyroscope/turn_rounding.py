@@ -72,8 +72,8 @@ def _still(away: FloatArray) -> int | None:
 def hidden_angles(
     readings: FloatArray, step_s: float, quantum: FloatArray, turns: IntArray, static: IntArray, raw_angle: FloatArray
 ) -> FloatArray:
-    """(k + 1, 3, m) errors by rounding to ``quantum`` (3,): angles of turns (k, 2), rate of static intervals (z, 2),
-    raw, per σ of m independent errors; m = 0 where noise dithers all axes.
+    """(k, 3, m) errors of the raw angles of turns (k, 2) by rounding to ``quantum`` (3,), per σ of m independent ones;
+    m = 0 where noise dithers all axes. ``static`` (z, 2) are intervals without rotation.
 
     While a rate stays inside an LSB its error is constant, uniform with variance q²/12: over T seconds the angle error
     is ``q T/√12`` rms. Turns about one axis in one sense with the same code may have one rate (a table's): they share
@@ -86,8 +86,6 @@ def hidden_angles(
     columns: dict[tuple[int, ...], FloatArray] = {}
     for axis in np.flatnonzero(undithered_axes(quantum, np.nanstd(still, axis=0))).tolist():
         size = float(quantum[axis]) / np.sqrt(12.0)
-        at_rest = columns.setdefault((axis,), np.zeros((len(turns) + 1, 3)))
-        at_rest[-1, axis] = size
         for row, (a, b) in enumerate(turns.tolist()):
             # Axis and sense of the turn: those of the largest raw angle.
             main = int(np.argmax(np.abs(raw_angle[row])))
@@ -96,9 +94,9 @@ def hidden_angles(
                 is_end = (first == 0) != (last == b - a)
                 is_rest = is_end and abs(level - rest[axis]) < IN_STEP * quantum[axis]
                 key = (axis,) if is_rest else (axis, round(level / float(quantum[axis])), sense)
-                error = columns.setdefault(key, np.zeros((len(turns) + 1, 3)))
+                error = columns.setdefault(key, np.zeros((len(turns), 3)))
                 error[row, axis] += size * (last - first) * step_s
-    return np.stack(list(columns.values()), axis=2) if columns else np.zeros((len(turns) + 1, 3, 0))
+    return np.stack(list(columns.values()), axis=2) if columns else np.zeros((len(turns), 3, 0))
 
 
 def _dwells(readings: FloatArray) -> Iterator[tuple[int, int, float]]:

@@ -133,19 +133,30 @@ class Updated(Predicted):
     left: FloatArray
     is_fitted: bool
 
+    def gyroscope(self, before: SensorCalibration) -> SensorCalibration:
+        """The gyro with these parameters."""
+        return _with(before, self.values[12:], self.covariance[12:, 12:])
+
     def of(self, calibration: Calibration, recording: Recording, segments: Segments) -> Calibration:
-        """The calibration with these parameters, and with residuals of poses and moves at them."""
-        assert calibration.gyroscope is not None
-        shift = self.values - parameters_of(calibration)
-        # The shift from the optimum of poses and moves increases their χ² by this, to first order.
-        cost = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
-        after = replace(
-            calibration,
-            accelerometer=_with(calibration.accelerometer, self.values[:12], self.covariance[:12, :12]),
-            gyroscope=_with(calibration.gyroscope, self.values[12:], self.covariance[12:, 12:]),
-            covariance=self.covariance,
-        )
-        return with_own_residuals(after, recording, segments, cost)
+        """The calibration with these parameters."""
+        return moved_to(calibration, self.values, self.covariance, recording, segments)
+
+
+def moved_to(
+    calibration: Calibration, values: FloatArray, covariance: FloatArray, recording: Recording, segments: Segments
+) -> Calibration:
+    """The calibration with parameters ``values`` (24,), and with residuals of poses and moves at them."""
+    assert calibration.gyroscope is not None
+    shift = values - parameters_of(calibration)
+    # The shift from the optimum of poses and moves increases their χ² by this, to first order.
+    cost = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
+    after = replace(
+        calibration,
+        accelerometer=_with(calibration.accelerometer, values[:12], covariance[:12, :12]),
+        gyroscope=_with(calibration.gyroscope, values[12:], covariance[12:, 12:]),
+        covariance=covariance,
+    )
+    return with_own_residuals(after, recording, segments, cost)
 
 
 def parameters_of(calibration: Calibration) -> FloatArray:

@@ -7,9 +7,8 @@ import numpy as np
 
 from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.channel_facts.static_axes import find_low_passes
-from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.verdict import residual_findings
-from trihedron.estimate.gyroscope.findings import describe, findings_of, worst_sigma
+from trihedron.estimate.gyroscope.findings import describe, findings_of
 from trihedron.estimate.gyroscope.lost_samples import (
     PossibleLosses,
     could_be_remade,
@@ -219,51 +218,24 @@ def _mean_square(log: Log, found: _Fit) -> float:
     return float((errors**2).sum()) / max(by_noise, TINY)
 
 
-# The gyro's scale from gravity: rough, but sufficient to distinguish turns of 90, 180 and 360 degrees.
-
-
-LARGEST_DOUBT = 0.1
-"""Largest relative standard uncertainty of a scale that is used: three of them still exclude half and twice."""
-LEAST_TOLERANCE = 0.01
-"""Smallest tolerance: errors that the fit does not show (nonlinearity, accelerations of the hand)."""
-
-
-def scale_by_gravity(
-    recording: Recording, segments: Segments, accelerometer: SensorCalibration, gravity_m_s2: float
-) -> tuple[FloatArray, float] | None:
-    """Scale (3, 3) [rad/s per raw unit] of the gyro from moves that change gravity's direction (method 2), and three
-    relative standard uncertainties of its worst direction; ``None`` where they do not determine it.
-
-    Moves from face to face rotate gravity by 90°, turns on a tilted table by a little: with a scale wrong by a factor
-    of two the tilt errors would be tens of degrees.
-    """
-    if recording.gyroscope is None or recording.accelerometer is None:
-        return None
-    try:
-        gyroscope, _ = calibrate_moves(recording, segments, accelerometer, gravity_m_s2)
-    except INPUT_ERRORS:
-        return None
-    quality, seen = gyroscope.quality, gyroscope.observability
-    if quality is None or seen is None or seen.rank < seen.n_parameters or quality.angle_deg is None:
-        return None
-    sigma = worst_sigma(gyroscope.covariance[:9, :9], gyroscope.S)
-    return (gyroscope.S, max(3.0 * sigma, LEAST_TOLERANCE)) if sigma < LARGEST_DOUBT else None
-
-
 # Joint fit of both sensors: the reference solution, with the covariance of all 24 parameters.
 
 
 def calibrate_joint(
-    recording: Recording, segments: Segments, alone: Calibration, nominal_scale: FloatArray | float | None = None
+    recording: Recording,
+    segments: Segments,
+    alone: Calibration,
+    nominal_scale: FloatArray | float | None = None,
+    known_scale: FloatArray | None = None,
 ) -> Calibration:
     """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
 
     The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
     lower-triangular: the data do not determine the rotation of the triad against the case. The fit starts from
-    ``alone``, the accelerometer calibrated by poses, whose residuals it replaces; ``nominal_scale`` and errors are
-    those of ``calibrate_moves``.
+    ``alone``, the accelerometer calibrated by poses, whose residuals it replaces, and from the gyro's ``known_scale``
+    (3, 3) where turns show it; ``nominal_scale`` and errors are those of ``calibrate_moves``.
     """
-    log = Log(recording, segments, alone.accelerometer, alone.gravity_m_s2, is_given=False)
+    log = Log(recording, segments, alone.accelerometer, alone.gravity_m_s2, is_given=False, scale=known_scale)
     found = solved(log, nominal_scale)
     solution, left_out = found.solution, found.held_out
     quality = norm_quality(solution, None if left_out is None else (left_out.norm, left_out.norm_sigma))

@@ -32,7 +32,7 @@ USUAL_RAD = 0.03
 @dataclass(frozen=True, eq=False)
 class Log:
     """Input of a session's fit; an accelerometer that ``is_given`` is fixed, sensors that are ``is_filtered`` have a
-    low-pass."""
+    low-pass. ``scale`` (3, 3) is the gyro's where it is known beforehand, to begin with."""
 
     recording: Recording
     segments: Segments
@@ -40,6 +40,7 @@ class Log:
     gravity_m_s2: float
     is_given: bool
     is_filtered: bool = False
+    scale: FloatArray | None = None
 
     def observed(self, measured: MoveMeasurements, used: BoolArray, near: Near) -> Observed:
         """The session with the moves ``used`` (m,)."""
@@ -107,7 +108,9 @@ def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
     if np.all(measured.is_lost):
         raise GyroClippedError(measured)
     S_a, b_a, R = lower(log.accelerometer.S, log.accelerometer.b)
-    first = initial_scale(log.recording, measured, log.accelerometer, nominal)
+    first = log.scale
+    if first is None:
+        first = initial_scale(log.recording, measured, log.accelerometer, nominal)
     return S_a, b_a, R @ along_paths(measured, log.accelerometer, first)
 
 

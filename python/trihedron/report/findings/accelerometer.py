@@ -92,8 +92,8 @@ ENTRIES = {
         "--method joint uses them all.",
     ),
     (Code.TABLE_TILT, "", WARNING): Words(
-        "{is_by_heading:?Readings at opposite headings differ|The faces contradict each other (χ² per degree of "
-        "freedom {chi2_per_dof:.3g})} as if each pose were tilted by {tilt_deg:.2g}° rms; most in pose {pose} ({face})"
+        "The faces contradict each other (χ² per degree of "
+        "freedom {chi2_per_dof:.3g}) as if each pose were tilted by {tilt_deg:.2g}° rms; most in pose {pose} ({face})"
         ". The standard uncertainties include this tilt.",
         "The table is not level, the case is not square or did not lie flat; bias drift looks the same.",
         "Level the table and press the case flat; or record 9 or more poses in other orientations, which need neither.",

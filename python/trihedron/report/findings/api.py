@@ -15,12 +15,11 @@ _CALIBRATE = {
         "Give --latitude DEG (and --height M), or --gravity M_S2: without it scales may be off by "
         "{possible_error_percent:.1f} %.",
     ),
-    (Code.TURN_ANGLE_UNKNOWN, "", SERIOUS): Words(
-        "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
-        "Give the angles with --turns.",
-        "Nothing in the log determines the gyro's scale: no unit, no nominal scale, and no moves that turn gravity "
-        "well enough to exclude half and twice.",
-        "Give --turns 180,-180,... (one angle a turn, 0 excludes it), or --gyro-nominal.",
+    (Code.TURN_ANGLE_UNKNOWN, "", WARNING): Words(
+        "Some turns on the table are not used: the gyro's scale is not known well enough to say which multiple of 90° "
+        "each of them is.",
+        "Few moves turn gravity, and no smaller turn about that axis is known.",
+        "Give --turns 180,-180,... (one angle a turn, 0 excludes it).",
     ),
     (Code.GYROSCOPE_LEFT_OUT, "not-calibrated", WARNING): Words(
         "The gyro was not calibrated: {why}.",
@@ -32,12 +31,6 @@ _CALIBRATE = {
         "scale.",
         "The sensor was turned faster than its range limit.",
         "Record again with rates below about half the range limit, or set a wider range.",
-    ),
-    (Code.GYROSCOPE_LEFT_OUT, "no-known-turns", WARNING): Words(
-        "The gyro was not calibrated: {why}.",
-        "With faces alone it is calibrated by turns on the table, by known angles, in poses on one face.",
-        "Turn the case flat on the table by known angles on three faces that are not opposite, and state them: "
-        "--turns 90,-90,...; or leave --method faces out, where there are 18 or more different poses.",
     ),
     (Code.NOT_FIT, "no-calibration", SERIOUS): Words(
         "No calibration can be made from this log: {why}.",

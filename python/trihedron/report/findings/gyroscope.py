@@ -65,12 +65,6 @@ _MOVES = {
         "If the log did not last as long as its timestamps say (a clock tells), they or the rate are wrong by "
         "{excess:abs .2g %}: record again, or give --columns time=none and --rate.",
     ),
-    (Code.LEFT_HANDED, "gyro", WARNING): Words(
-        "the gyro's axes as logged form a left-handed triad (det S < 0).",
-        "a turn was stated in the wrong sense; or one documented gyro axis is reversed, or two are exchanged.",
-        "Check the sense of the stated turns, then the axis directions of the board, which the calibration corrects.",
-        numbers=("determinant",),
-    ),
     (Code.LEFT_HANDED, "gyro-reversed", WARNING): Words(
         "gyro {axis:axis} turns against accelerometer {axis:axis}.",
         "its documented direction is wrong, or its sign was changed.",
@@ -183,13 +177,6 @@ _MOVES = {
         "`trihedron calibrate LOG --extended -o FILE --force`. Do not use this gyro calibration.",
         or_severity=SERIOUS,
     ),
-    (Code.LEFT_HANDED, "turns-reversed", SERIOUS): Words(
-        "The moves between poses contradict the sense of the turns: the tilt error after them is {rms_deg:.3g}° rms, "
-        "and {rms_other_deg:.3g}° with all turns reversed.",
-        "The accelerometer's axes form a left-handed triad as documented, or the turns were stated the other way "
-        "round.",
-        "State the directions of the board's axes with --axis-signs, or turn the signs of --turns.",
-    ),
     (Code.LEFT_HANDED, "turns-against-moves", SERIOUS): Words(
         "The moves between poses contradict the sense of the turns: by them the gyro turned the other way in all "
         "{turns:.0f}.",
@@ -268,39 +255,16 @@ _TURNS = {
         "turned by eye, without a wall.",
         "Place the case against a wall before and after each turn.",
     ),
-    **{
-        (Code.TURN_NOT_A_MULTIPLE, case, WARNING): Words(
-            f"turn {{turn}} ({{at_s:.1f}} s) about {{axis:axis}} is {{seen_rad:.1f deg}}, far from {what} "
-            "{wanted_rad:.0f deg}; it is excluded.",
-            cause,
-            action,
-        )
-        for case, what, cause, action in (
-            ("not-the-stated", "the stated", "another angle or sign than stated.", _CORRECT_ITS_VALUE),
-            (
-                "no-multiple",
-                "any multiple of",
-                "turned without a wall, or the nominal scale is far off.",
-                "Repeat it against a wall, or give its angle.",
-            ),
-        )
-    },
     (Code.TURN_UNCHECKED, "", WARNING): Words(
-        "only one turn about {axes:axes and}: a wrong angle would not show.",
+        "only one turn about {axes:axes and}, which no move checks: a wrong angle would not show.",
         "a wrong angle goes into the scale unnoticed.",
         "Turn there and back at least once about every axis.",
     ),
-    (Code.RESIDUAL_ABOVE_NOISE, "turns", WARNING): Words(
-        "the error of the turns exceeds what noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} degrees of "
-        "freedom; the standard uncertainties are multiplied by its root.",
-        "turns that were not the stated angle, a table that is not level, or bias drift.",
-        "Repeat the turns against a wall.",
-    ),
-    (Code.GYRO_BIAS_DRIFT, "turns", NOTE): Words(
-        "the gyro's bias changes between poses by up to {change_rad_s:.2g °/s} ({axis:axis}), {times:.1f} times its "
-        "noise.",
-        _BIAS_CHANGES,
-        "Let the sensor warm up; keep still before and after every turn.",
+    (Code.TURN_NOT_A_MULTIPLE, "no-multiple", WARNING): Words(
+        "turn {turn} ({at_s:.1f} s) about {axis:axis} is {seen_rad:.1f deg}, far from any multiple of 90°; it is "
+        "excluded.",
+        "turned without a wall.",
+        "Repeat it against a wall, or give its angle.",
     ),
 }
 

@@ -34,8 +34,6 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         # moves and turns of a gyro
         "gyro-scale": "scale of gyro {axis:axis} (S_{axis:letter}{axis:letter})",
         "gyro-share": "gyro cross-axis {axis:axis} into {rate:axis} (S_{rate:letter}{axis:letter})",
-        "gyro-answer": "response of gyro {axis:axis} to turns about {about:axis} of the case, uncertainty "
-        "{share:.2g %} (1 σ)",
         "turns-about": "lay one body axis level and turn the sensor about it by 90 to 120°, with a pose before and "
         "after: {turns:each; }",
         "moves-about-all": "add moves about all three body axes in level position, each with a pose before and after",
@@ -50,7 +48,6 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "zero-residual": "converged: the residual vanishes to rounding",
         "no-descent": "stopped: no change reduces the cost any further",
         "too-many-iterations": "stopped: iteration limit reached before convergence",
-        "closed-form": "closed form",
         "linear-least-squares": "linear least squares",
         # likely mistakes in a model's parameters
         "biases-never-added": "All simulated {sensor} biases are 0: was the drawn bias never applied?",

@@ -1,0 +1,118 @@
+"""A session of poses and moves in the frame of a case, which stood on its faces and was turned on them."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.estimate.accelerometer.face_poses import direction_of
+from trihedron.estimate.accelerometer.faces import tilt_findings
+from trihedron.estimate.case_frame import (
+    TABLE,
+    TURN,
+    CaseFit,
+    OnFaces,
+    across_faces,
+    at_headings,
+    fit_case,
+    spread_over,
+)
+from trihedron.estimate.gyroscope.stated_turns import TableTurns
+from trihedron.estimate.gyroscope.turntable import moved_to, parameters_of
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
+from trihedron.sensor_model import correct
+from trihedron.transforms import cross_matrix, directions_of, rotation_by
+
+PASSES, SETTLED_RAD = 10, 1e-7
+"""Most fits, each about the rotation by the one before, and the step at which they end: rows are linear but in it."""
+
+
+def in_case_frame(
+    calibration: Calibration, turns: TableTurns, recording: Recording, segments: Segments, up: IntArray
+) -> Calibration:
+    """The calibration of poses and moves in the frame of a case with face ``up`` (n,) in each pose (0: none), updated
+    with the axes that gravity on its faces and ``turns`` on them show."""
+    means, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean
+    assert means is not None
+    assert sigma is not None
+    used, g = np.flatnonzero(up), calibration.gravity_m_s2
+    n = len(used)
+    faces, noise = up[used], sigma[used, :, None] ** 2 * np.eye(3)
+    poses = OnFaces(means[used], noise, faces, np.full(n, g), np.ones(n))
+    headings, placement = _placed(up, turns)
+    table = spread_over(at_headings(faces, headings[used]), placement[used])
+    sensor = calibration.accelerometer
+    R = _nearest(faces, directions_of(correct(means[used], sensor.S, sensor.b)))
+    for _ in range(PASSES):
+        turned = _turned(calibration, R)
+        assert turned.gyroscope is not None
+        values = parameters_of(turned)
+        rows = poses.rows(turned.accelerometer.S, across_faces(faces), 0, 24)
+        rows = replace(rows, leans={TABLE: table} | poses.face_leans())
+        of_turns = None
+        if turns.moves:
+            on_faces = _on_faces(turns, up)
+            of_turns = on_faces.rows(turned.gyroscope.S, across_faces(on_faces.faces), 12, 24)
+            own = np.diag(np.repeat(1.0 / np.abs(turns.angles), 2))
+            of_turns = replace(of_turns, leans={TURN: own} | on_faces.face_leans())
+        fit = fit_case(values, turned.covariance, _rotations(values), rows, of_turns)
+        R = rotation_by(fit.steps) @ R
+        if np.max(np.abs(fit.steps)) < SETTLED_RAD:
+            break
+    after = moved_to(turned, fit.values, fit.covariance, recording, segments)
+    return replace(after, findings=(*calibration.findings, *_said(after, fit, means[used], faces, used)))
+
+
+def _said(after: Calibration, fit: CaseFit, means: FloatArray, faces: IntArray, used: IntArray) -> Iterator[Finding]:
+    sensor = after.accelerometer
+    off = correct(means, sensor.S, sensor.b) - after.gravity_m_s2 * direction_of(faces)
+    return tilt_findings(fit.sizes.get(TABLE, 0.0), fit, faces, off, used)
+
+
+def _placed(up: IntArray, turns: TableTurns) -> tuple[FloatArray, IntArray]:
+    """Heading (n,) [rad] of each pose in its placement, and the number of that: turns keep the case on the table."""
+    headings, placement = np.zeros(len(up)), np.arange(len(up))
+    for move, angle in zip(turns.moves, turns.angles, strict=True):
+        before, after = move.pose_before, move.pose_after
+        if up[before] == up[after]:
+            headings[after], placement[after] = headings[before] + angle, placement[before]
+    return headings, placement
+
+
+def _on_faces(turns: TableTurns, up: IntArray) -> OnFaces:
+    measured, times = turns.measured, turns.measured.duration_s
+    variance = measured.var_rate * times[:, None] + measured.bias_spread * times[:, None] ** 2
+    variance = variance + np.sum(measured.hidden**2, axis=2)
+    faces = up[[move.pose_before for move in turns.moves]]
+    return OnFaces(measured.raw_angle, variance[:, :, None] * np.eye(3), faces, turns.angles, times)
+
+
+def _nearest(faces: IntArray, up: FloatArray) -> FloatArray:
+    """The rotation (3, 3) that brings verticals ``up`` (n, 3) nearest to the axes of the case (Kabsch)."""
+    u, _, vt = np.linalg.svd(direction_of(faces).T @ up)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def _turned(calibration: Calibration, R: FloatArray) -> Calibration:
+    """The calibration in a frame turned by ``R`` (3, 3)."""
+    own = np.zeros((12, 12))
+    own[:9, :9], own[9:, 9:] = np.kron(R, np.eye(3)), R
+    both = np.kron(np.eye(2), own)
+    covariance = both @ calibration.covariance @ both.T
+
+    def turned(sensor: SensorCalibration, at: int) -> SensorCalibration:
+        return replace(sensor, S=R @ sensor.S, b=R @ sensor.b, covariance=covariance[at : at + 12, at : at + 12])
+
+    assert calibration.gyroscope is not None
+    accelerometer, gyroscope = turned(calibration.accelerometer, 0), turned(calibration.gyroscope, 12)
+    return replace(calibration, accelerometer=accelerometer, gyroscope=gyroscope, covariance=covariance, frame="case")
+
+
+def _rotations(values: FloatArray) -> FloatArray:
+    """(24, 3) derivatives of the parameters by a rotation vector of the frame."""
+    out = []
+    for axis in np.eye(3):
+        cross = cross_matrix(axis)
+        out.append([np.append((cross @ of[:9].reshape(3, 3)).ravel(), cross @ of[9:]) for of in np.split(values, 2)])
+    return np.asarray(np.reshape(out, (3, 24)).T)
