@@ -43,7 +43,7 @@ class MoveMeasurements:
     in and beside moves, move after move, ``time_s`` (samples,) their times, ``edges`` (m, 2) each move's range in them;
     ``noise_density`` (3,) is the angle random walk in raw unit · √s, ``clipped_s`` (m,) the time of each move in which
     the gyro is at its range limit. ``rate``, ``force`` (samples, 3) are the readings of gyro and accelerometer;
-    ``bias_mean`` (3,) is the mean of the biases over the session. ``is_undithered`` (3,) are the axes whose noise does
+    ``is_undithered`` (3,) are the axes whose noise does
     not dither the LSB ``quantum`` (3,), ``is_hidden`` (samples, 3) is 1 where the reading of such an axis is in the LSB
     of its bias. ``bias_read``, ``var_bias_read`` (n, 3) are the biases from each pose alone, ``var_reading_noise``
     (n, 3) the variance of the accelerometer's pose means by noise alone, ``reading_variance`` (samples, 3) that of gyro
@@ -60,7 +60,6 @@ class MoveMeasurements:
     var_reading: FloatArray
     bias: FloatArray
     var_bias: FloatArray
-    bias_mean: FloatArray
     noise_density: FloatArray
     sigma_time_s: float
     nominal_step_s: float
@@ -98,7 +97,6 @@ class MoveMeasurements:
         return replace(
             self, rate=self.rate - (self.force @ S.T + b) @ by_force.T, bias_read=read, bias=bias,
             var_bias=np.where(self.is_undithered, self.var_bias, var_bias), bias_excess=excess,
-            bias_mean=np.where(self.is_undithered, bias.mean(axis=0), mean),
         )  # fmt: skip
 
 
@@ -161,7 +159,6 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     if np.any(undithered):
         of_codes, own = _by_codes(bias_read, segments, gyroscope, quantum, undithered)
         bias, var_bias = np.where(undithered, of_codes, bias), np.where(undithered, own**2, var_bias)
-        mean = np.where(undithered, bias.mean(axis=0), mean)
         # At rest inside a move an axis reads as in the poses around it.
         for (first, last), pair in zip(edges, (of_codes - bias_read)[links], strict=True):
             rate[first:last] += hidden[first:last] * np.linspace(pair[0], pair[1], last - first)
@@ -178,7 +175,6 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         var_reading=var_reading + _unexplained_reading_variance(accelerometer),
         bias=bias,
         var_bias=var_bias,
-        bias_mean=mean,
         noise_density=density,
         sigma_time_s=jitter,
         nominal_step_s=nominal,
