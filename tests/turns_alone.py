@@ -3,8 +3,7 @@
 import numpy as np
 
 from trihedron.estimate.gyroscope.findings import TurnName
-from trihedron.estimate.gyroscope.stated_turns import TableTurns
-from trihedron.estimate.gyroscope.turn_angles import measure_turns
+from trihedron.estimate.gyroscope.stated_turns import TableTurns, measure_turns
 from trihedron.records import Calibration, Move, SensorCalibration
 
 VAGUE = 0.3

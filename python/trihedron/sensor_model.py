@@ -18,7 +18,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.invariants import polar_rotation
-from trihedron.records.calibration import Calibration, Frame
+from trihedron.records.calibration import Calibration, Frame, SensorCalibration
 from trihedron.transforms import cross_matrix
 
 
@@ -174,27 +174,36 @@ def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
         return calibration
     if frame == "case":
         raise InputError("the case frame is only known from method 1 (six faces of the case)")
-    accelerometer = calibration.accelerometer
-    change = reframing(accelerometer.S, accelerometer.b, frame)
+    change = reframing(calibration.accelerometer.S, calibration.accelerometer.b, frame)
+    out = _reframed(calibration, change, frame)
+    accelerometer = out.accelerometer
+    return replace(out, accelerometer=replace(accelerometer, S=_exactly_in_frame(accelerometer.S, frame)))
+
+
+def turned(calibration: Calibration, rotation: FloatArray) -> Calibration:
+    """Both sensors in the frame of a case, to which a ``rotation`` (3, 3) leads that is none of S."""
+    fixed = Reframing(rotation, np.zeros((3, 12)), np.eye(12))
+    own, _ = fixed.follow(calibration.accelerometer.S, calibration.accelerometer.b)
+    return _reframed(calibration, replace(fixed, jacobian=own), "case")
+
+
+def _reframed(calibration: Calibration, change: Reframing, frame: Frame) -> Calibration:
     n = len(calibration.covariance)
     jacobian = np.zeros((n, n))
     jacobian[:12, :12] = change.jacobian
-    gyroscope = calibration.gyroscope
+    accelerometer, gyroscope = calibration.accelerometer, calibration.gyroscope
     if gyroscope is not None:
         jacobian[12:, 12:], jacobian[12:, :12] = change.follow(gyroscope.S, gyroscope.b)
     covariance = jacobian @ calibration.covariance @ jacobian.T
-    R = change.rotation
+
+    def moved(sensor: SensorCalibration, at: int) -> SensorCalibration:
+        S, b = change.rotation @ sensor.S, change.rotation @ sensor.b
+        return replace(sensor, S=S, b=b, covariance=covariance[at : at + 12, at : at + 12])
+
     return replace(
         calibration,
-        accelerometer=replace(
-            accelerometer,
-            S=_exactly_in_frame(R @ accelerometer.S, frame),
-            b=R @ accelerometer.b,
-            covariance=covariance[:12, :12],
-        ),
-        gyroscope=None
-        if gyroscope is None
-        else replace(gyroscope, S=R @ gyroscope.S, b=R @ gyroscope.b, covariance=covariance[12:, 12:]),
+        accelerometer=moved(accelerometer, 0),
+        gyroscope=None if gyroscope is None else moved(gyroscope, 12),
         covariance=covariance,
         frame=frame,
     )

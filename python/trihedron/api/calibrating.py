@@ -20,9 +20,13 @@ from trihedron.estimate.accelerometer.norm import calibrate_norm
 from trihedron.estimate.case_session import in_case_frame
 from trihedron.estimate.gyroscope.common_scale import scale_findings, without_first_scale
 from trihedron.estimate.gyroscope.lost_samples import missing_samples, relative_sigma
-from trihedron.estimate.gyroscope.measurements import GAP_STEPS
-from trihedron.estimate.gyroscope.stated_turns import TableTurns, by_quarters, on_stated_turns, table_turns
-from trihedron.estimate.gyroscope.turn_angles import scale_of_stated
+from trihedron.estimate.gyroscope.stated_turns import (
+    TableTurns,
+    by_quarters,
+    on_stated_turns,
+    scale_of_stated,
+    table_turns,
+)
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves
 from trihedron.estimate.session.start import GyroClippedError
@@ -183,7 +187,7 @@ def of_board(calibration: Calibration, recording: Recording) -> Calibration:
 def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
     """Findings about the fit, its poses, a gyro scale that contradicts its unit, and lost samples."""
     gyro = calibration.gyroscope
-    fitted = tuple(_timed(one, recording, segments) for one in with_shapes(calibration, segments))
+    fitted = with_shapes(calibration, segments)
     if gyro is None:
         return fitted
     # The uncertainty without losses, where it is widened by those that are possible.
@@ -194,21 +198,6 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     # Losses detected in the motion are not also possible ones of the fit.
     fitted = tuple(one for one in fitted if not (missing and one.code is FindingCode.LOSSES_POSSIBLE))
     return (*fitted, *of_gyro, *missing)
-
-
-def _timed(found: Finding, recording: Recording, segments: Segments) -> Finding:
-    """An outlier move with its time; one whose samples were lost says so."""
-    if found.code is not FindingCode.OUTLIER_MOVE:
-        return found
-    move = segments.moves[int(found.numbers["move"]) - 1]
-    steps = np.diff(recording.time_s[move.start : move.stop + 1])
-    return Finding.of(
-        FindingCode.OUTLIER_MOVE,
-        "gap" if steps.max(initial=0.0) > GAP_STEPS / recording.rate_hz else "timed",
-        move=int(found.numbers["move"]), before=move.pose_before + 1, after=move.pose_after + 1,
-        start_s=float(recording.time_s[move.start]),
-        residual_deg=found.numbers["residual_deg"], times=found.numbers["times"],
-    )  # fmt: skip
 
 
 def _by_poses(

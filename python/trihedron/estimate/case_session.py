@@ -20,8 +20,8 @@ from trihedron.estimate.case_frame import (
 )
 from trihedron.estimate.gyroscope.stated_turns import TableTurns
 from trihedron.estimate.gyroscope.turntable import moved_to, parameters_of
-from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
-from trihedron.sensor_model import correct
+from trihedron.records import Calibration, Finding, Recording, Segments
+from trihedron.sensor_model import correct, turned
 from trihedron.transforms import cross_matrix, directions_of, rotation_by
 
 PASSES, SETTLED_RAD = 10, 1e-7
@@ -45,22 +45,22 @@ def in_case_frame(
     sensor = calibration.accelerometer
     R = _nearest(faces, directions_of(correct(means[used], sensor.S, sensor.b)))
     for _ in range(PASSES):
-        turned = _turned(calibration, R)
-        assert turned.gyroscope is not None
-        values = parameters_of(turned)
-        rows = poses.rows(turned.accelerometer.S, across_faces(faces), 0, 24)
+        near = turned(calibration, R)
+        assert near.gyroscope is not None
+        values = parameters_of(near)
+        rows = poses.rows(near.accelerometer.S, across_faces(faces), 0, 24)
         rows = replace(rows, leans={TABLE: table} | poses.face_leans())
         of_turns = None
         if turns.moves:
             on_faces = _on_faces(turns, up)
-            of_turns = on_faces.rows(turned.gyroscope.S, across_faces(on_faces.faces), 12, 24)
+            of_turns = on_faces.rows(near.gyroscope.S, across_faces(on_faces.faces), 12, 24)
             own = np.diag(np.repeat(1.0 / np.abs(turns.angles), 2))
             of_turns = replace(of_turns, leans={TURN: own} | on_faces.face_leans())
-        fit = fit_case(values, turned.covariance, _rotations(values), rows, of_turns)
+        fit = fit_case(values, near.covariance, _rotations(values), rows, of_turns)
         R = rotation_by(fit.steps) @ R
         if np.max(np.abs(fit.steps)) < SETTLED_RAD:
             break
-    after = moved_to(turned, fit.values, fit.covariance, recording, segments)
+    after = moved_to(near, fit.values, fit.covariance, recording, segments)
     return replace(after, findings=(*calibration.findings, *_said(after, fit, means[used], faces, used)))
 
 
@@ -92,21 +92,6 @@ def _nearest(faces: IntArray, up: FloatArray) -> FloatArray:
     """The rotation (3, 3) that brings verticals ``up`` (n, 3) nearest to the axes of the case (Kabsch)."""
     u, _, vt = np.linalg.svd(direction_of(faces).T @ up)
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
-
-
-def _turned(calibration: Calibration, R: FloatArray) -> Calibration:
-    """The calibration in a frame turned by ``R`` (3, 3)."""
-    own = np.zeros((12, 12))
-    own[:9, :9], own[9:, 9:] = np.kron(R, np.eye(3)), R
-    both = np.kron(np.eye(2), own)
-    covariance = both @ calibration.covariance @ both.T
-
-    def turned(sensor: SensorCalibration, at: int) -> SensorCalibration:
-        return replace(sensor, S=R @ sensor.S, b=R @ sensor.b, covariance=covariance[at : at + 12, at : at + 12])
-
-    assert calibration.gyroscope is not None
-    accelerometer, gyroscope = turned(calibration.accelerometer, 0), turned(calibration.gyroscope, 12)
-    return replace(calibration, accelerometer=accelerometer, gyroscope=gyroscope, covariance=covariance, frame="case")
 
 
 def _rotations(values: FloatArray) -> FloatArray:

@@ -27,7 +27,7 @@ class Observability(Frozen):
 
     ``singular_values`` of the whitened, column-scaled Jacobian (largest first), ``condition`` their ratio, ``rank`` the
     number above rounding, ``n_parameters`` the number of free parameters; ``weakest`` names the worst determined one in
-    words and ``advice`` poses or turns to add. ``correlated`` lists parameter pairs with |correlation| > 0.9.
+    words and ``advice`` poses or turns to add.
     """
 
     rank: int
@@ -36,7 +36,6 @@ class Observability(Frozen):
     singular_values: FloatArray
     weakest: str = ""
     advice: tuple[str, ...] = ()
-    correlated: tuple[tuple[str, str, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -145,20 +145,6 @@ class PoseDesign:
             information += np.outer(rows[best], rows[best])
         return tuple(advised)
 
-    def correlated(self) -> tuple[tuple[str, str, float], ...]:
-        """Pairs of parameters with |correlation| > 0.9, strongest first."""
-        if self.rank < 9:
-            return ()
-        sigma = np.sqrt(np.diag(self.covariance))
-        correlation = self.covariance / np.outer(sigma, sigma)
-        pairs = [
-            (parameter_names()[j], parameter_names()[k], float(correlation[j, k]))
-            for j in range(9)
-            for k in range(j + 1, 9)
-            if abs(correlation[j, k]) > 0.9
-        ]
-        return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))
-
     def observability(self, relative_sigma: float, n_advised: int = 3) -> Observability:
         """The design as an ``Observability`` record, with at least ``n_advised`` poses to add."""
         missing = max(9 - self.rank, 0)
@@ -170,5 +156,4 @@ class PoseDesign:
             singular_values=self.singular_values,
             weakest=self.weakest(),
             advice=self.advice(relative_sigma, n_advised),
-            correlated=self.correlated(),
         )

@@ -14,7 +14,6 @@ from trihedron.estimate.session.start import ASTRAY_DEG, usual_deg
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
 from trihedron.records import (
-    PARAMETER_NAMES,
     Finding,
     FindingCode,
     Observability,
@@ -142,9 +141,11 @@ def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, see
         size = float(np.linalg.norm(seen.residual[index]))
         yield Finding.of(
             FindingCode.OUTLIER_MOVE,
+            "gap" if measured.is_gapped[index] else "timed",
             move=int(index) + 1,
             before=before + 1,
             after=after + 1,
+            start_s=float(measured.time_s[measured.edges[index, 0]]),
             residual_deg=degrees_from_radians(size / STANDARD_GRAVITY_M_S2),
             times=size / sigma,
         )
@@ -277,14 +278,6 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
     share = sigmas_of(covariance).reshape(3, 3) / scale
     rate, axis = (int(k) for k in np.unravel_index(np.argmax(share), (3, 3)))
     weakest = words("gyro-scale" if rate == axis else "gyro-share", axis=axis + 1, rate=rate + 1)
-    sigma = np.sqrt(np.maximum(np.diag(covariance), TINY))
-    correlation = covariance / np.outer(sigma, sigma)
-    pairs = tuple(
-        (PARAMETER_NAMES[i], PARAMETER_NAMES[j], float(correlation[i, j]))
-        for i in range(9)
-        for j in range(i + 1, 9)
-        if abs(correlation[i, j]) > 0.9
-    )
     size = max(float(np.linalg.norm(S, 2)), np.finfo(float).tiny)
     singular = size / np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), TINY))
     # The fit has a prior as wide as the scale: below √2 the moves add less information than the prior.
@@ -292,7 +285,7 @@ def describe(covariance: FloatArray, S: FloatArray) -> Observability:
     condition = float(singular[0] / singular[-1]) if rank == 9 else float("inf")
     is_weak = rank < 9 or worst_sigma(covariance, S) > WEAK
     advice = (_advice(covariance, size),) if is_weak else ()
-    return Observability(rank, 9, condition, singular, weakest, advice, pairs)
+    return Observability(rank, 9, condition, singular, weakest, advice)
 
 
 def worst_sigma(covariance: FloatArray, S: FloatArray) -> float:

@@ -23,7 +23,7 @@ DELAY_S = 0.005
 """Prior σ of the delay between the sensors, by filters or readout: data sheets differ by up to some ms."""
 Near = tuple[FloatArray, FloatArray, FloatArray]
 """Initial ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) and ``S_w`` (3, 3)."""
-HELD = 1e-10
+HELD = 1e-7
 """Relative prior σ of a given accelerometer: far below any noise, and above rounding errors in the rows."""
 
 

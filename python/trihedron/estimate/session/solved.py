@@ -18,8 +18,8 @@ from trihedron.estimate.gyroscope.lost_samples import (
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
-from trihedron.estimate.session.observed import Near, with_prior
-from trihedron.estimate.session.start import Log, begun, is_enough, lower, near_one_another, scale_matrix
+from trihedron.estimate.session.observed import Near
+from trihedron.estimate.session.start import Log, begun, is_enough, near_one_another, scale_matrix
 from trihedron.probability import FALSE_ALARM, chdtri, fdtrc
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 from trihedron.session.noise import NOISE_DOF
@@ -36,12 +36,12 @@ def calibrate_moves(
 
     ``nominal_scale`` (3, 3) or a number [rad/s per raw unit] is needed where the moves do not determine an initial one.
 
-    The frame of the calibrated ``accelerometer`` becomes the gyro's, its covariance enters the gyro's. Raises
+    The ``accelerometer`` is lower-triangular, its covariance enters the gyro's. Raises
     ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
     log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True)
     found = solved(log, nominal_scale)
-    return in_frame_of(accelerometer, found), found.findings
+    return beside_given(accelerometer, found), found.findings
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,32 +163,19 @@ def _denied(found: _Fit) -> BoolArray:
     return out
 
 
-def in_frame_of(accelerometer: SensorCalibration, found: SolvedSession) -> SensorCalibration:
-    """The gyro in the frame of the given accelerometer, whose covariance is propagated into the gyro's.
+def beside_given(accelerometer: SensorCalibration, found: SolvedSession) -> SensorCalibration:
+    """The gyro with the error of the given ``accelerometer`` in its covariance.
 
-    For each principal error of the accelerometer the session is refitted with the shifted prior in the rotated frame.
+    ``∂(S_ω, b_ω)/∂(S, b) = C_ωa C_a⁻¹`` of the fit, whose prior of the accelerometer is narrower than what the moves
+    show of it.
     """
-    R = lower(accelerometer.S, accelerometer.b)[2].T
-    to_frame = np.zeros((12, 12))
-    to_frame[:9, :9], to_frame[9:, 9:] = np.kron(R, np.eye(3)), R
-    S, b = R @ found.solution.S_w, R @ found.solution.b_w
-    covariance = to_frame @ found.gyroscope.covariance @ to_frame.T
-    for direction in _standard_errors(accelerometer.covariance):
-        S_a, b_a, into = lower(accelerometer.S + direction[:9].reshape(3, 3), accelerometer.b + direction[9:])
-        observed = with_prior(found.solution.observed, S_a, b_a, found.solution.S_w, is_given=True)
-        other = refitted(observed, found.solution)
-        off = np.concatenate([(into.T @ other.S_w - S).ravel(), into.T @ other.b_w - b])
-        covariance += np.outer(off, off)
-    return replace(found.gyroscope, S=S, b=b, covariance=covariance)
-
-
-def _standard_errors(covariance: FloatArray) -> FloatArray:
-    """Principal errors: rows (k, 12) whose outer products sum to the covariance (12, 12)."""
-    size = np.sqrt(np.maximum(np.diag(covariance), TINY))
-    # Scaled to a correlation matrix: in counts and m/s² the variances span many decades.
-    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    keep = values > 1e-10 * float(values.max())
-    return np.asarray((size[:, None] * vectors[:, keep] * np.sqrt(values[keep])).T)
+    covariance = found.solution.covariance
+    known = np.flatnonzero(np.diag(covariance)[:12])
+    size = np.sqrt(np.diag(covariance)[known])
+    inverse = np.linalg.inv(covariance[np.ix_(known, known)] / np.outer(size, size)) / np.outer(size, size)
+    slope = covariance[12:, known] @ inverse
+    by_given = slope @ accelerometer.covariance[np.ix_(known, known)] @ slope.T
+    return replace(found.gyroscope, covariance=found.gyroscope.covariance + by_given)
 
 
 def _losses(log: Log, found: _Fit) -> PossibleLosses:

@@ -115,15 +115,12 @@ _MOVES = {
         "accelerometer.",
         "Check the axis directions of the board against both data sheets; the calibration itself corrects the gyro's.",
     ),
-    **{
-        (Code.OUTLIER_MOVE, case, WARNING): Words(
-            f"move {{move}}{at} (pose {{before}} to pose {{after}}) has a tilt error of {{residual_deg:.2g}}°, "
-            "{times:.0f} times its noise, and is excluded.",
-            "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
-            "Repeat the outlier moves; `trihedron diagnose LOG` tests what disturbed them.",
-        )
-        for case, at in (("", ""), ("timed", " at {start_s:.1f} s"))
-    },
+    (Code.OUTLIER_MOVE, "timed", WARNING): Words(
+        "move {move} at {start_s:.1f} s (pose {before} to pose {after}) has a tilt error of {residual_deg:.2g}°, "
+        "{times:.0f} times its noise, and is excluded.",
+        "one of its poses was not static, samples were lost, or the gyro was driven beyond its range limit.",
+        "Repeat the outlier moves; `trihedron diagnose LOG` tests what disturbed them.",
+    ),
     (Code.OUTLIER_MOVE, "gap", WARNING): Words(
         "move {move} at {start_s:.1f} s (pose {before} to pose {after}) has lost samples and is excluded: its tilt "
         "error is {residual_deg:.2g}°.",
