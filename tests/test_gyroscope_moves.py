@@ -234,14 +234,13 @@ def test_held_out_moves_are_predicted_as_well_as_the_error_bars_say(quiet):
 def test_a_missing_sensor_or_missing_moves_are_refused_in_one_sentence(quiet):
     recording, truth, segments = quiet
     rows = {name: getattr(recording, name)[:500] for name in ("time_s", "accelerometer", "gyroscope")}
-    for log, parts, nominal, words in (
-        (replace(recording, gyroscope=None), segments, None, "no gyroscope"),
-        (recording, replace(segments, moves=()), None, "no move between two poses"),
-        (replace(recording, **rows), segments, None, "another log"),
-        (recording, segments, np.ones(3), r"\(3, 3\)"),
+    for log, parts, words in (
+        (replace(recording, gyroscope=None), segments, "no gyroscope"),
+        (recording, replace(segments, moves=()), "no move between two poses"),
+        (replace(recording, **rows), segments, "another log"),
     ):
         with pytest.raises(ValueError, match=words):
-            calibrated(log, parts, truth, nominal)
+            calibrated(log, parts, truth)
 
 
 @pytest.mark.parametrize("axes", [np.eye(3), -SWAP])

@@ -15,7 +15,7 @@ from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.findings import TurnName, loose_turns, no_multiple, wrong_turn
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
-from trihedron.estimate.gyroscope.turntable import Predicted, StatedRates, not_fitted
+from trihedron.estimate.gyroscope.turntable import StatedRates, Updated, not_fitted
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
 from trihedron.records import Calibration, Finding, FindingCode, Move, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import correct
@@ -153,7 +153,7 @@ def on_stated_turns(
     return replace(after, findings=(*calibration.findings, *found)), turns.of(is_used)
 
 
-def contradicted(found: Predicted, unit: FloatArray) -> tuple[list[int], list[int]]:
+def contradicted(found: Updated, unit: FloatArray) -> tuple[list[int], list[int]]:
     """Turns that the others show to be wrong, and those of which some are, undecided which.
 
     Each turn is predicted by all others and what was known before. Their scatter is estimated from the median squared

@@ -76,7 +76,13 @@ class StatedRates:
         chi2 = float(left @ np.linalg.solve(noise, left))
         is_fitted = fdtrc(float(len(left)), NOISE_DOF, chi2 / len(left)) >= FALSE_ALARM
         return Updated(
-            misfit, innovation, values=values, covariance=covariance, scatter=scatter, left=left, is_fitted=is_fitted
+            misfit=misfit,
+            innovation=innovation,
+            values=values,
+            covariance=covariance,
+            scatter=scatter,
+            left=left,
+            is_fitted=is_fitted,
         )
 
     def scattered_on(self, calibration: Calibration) -> Updated:
@@ -86,16 +92,21 @@ class StatedRates:
         return self.on(calibration, scatter) if scatter > 0.0 else found
 
 
-@dataclass(frozen=True, eq=False)
-class Predicted:
-    """``misfit`` (k,) of rows as predicted by what was known before them, with its covariance ``innovation`` (k, k).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Updated:
+    """``misfit`` (k,) of rates as predicted by what was known before them, with its covariance ``innovation`` (k, k).
 
-    That leaves ``n_free`` directions of the rows undetermined.
-    """
+    Parameters of both sensors ``values`` (24,) with their ``covariance`` (24, 24), and the ``scatter`` of the rates
+    [rad/s], which the session predicts. ``left`` (k,) [rad/s] of the rates differs from these parameters, by no more
+    than their noise where the update ``is_fitted``."""
 
     misfit: FloatArray
     innovation: FloatArray
-    n_free: int = 0
+    values: FloatArray
+    covariance: FloatArray
+    scatter: float
+    left: FloatArray
+    is_fitted: bool
 
     def left_out(self, used: IntArray, further: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Error (n,) of each row ``used`` (n,) as the others predict it, and its variance (n,); ``further`` (k,) are
@@ -107,7 +118,7 @@ class Predicted:
     def shown_scatter(self, unit: FloatArray) -> float:
         """Scatter of rows that deviate by more than all known errors, else 0: with it χ² is its degrees of freedom.
         ``unit`` (k,) is the change of each row by a scatter of one."""
-        dof = len(self.misfit) - self.n_free
+        dof = len(self.misfit)
 
         def chi2(scatter: float) -> float:
             covariance = self.innovation + np.diag((scatter * unit) ** 2)
@@ -119,19 +130,6 @@ class Predicted:
 
         most = float(np.sqrt(np.sum((self.misfit / unit) ** 2) / dof))
         return float(brentq(lambda one: chi2(one) - dof, 0.0, most))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Updated(Predicted):
-    """Parameters of both sensors ``values`` (24,) with their ``covariance`` (24, 24), and the ``scatter`` of the rates
-    [rad/s], which the session predicts. ``left`` (k,) [rad/s] of the rates differs from these parameters, by no more
-    than their noise where the update ``is_fitted``."""
-
-    values: FloatArray
-    covariance: FloatArray
-    scatter: float
-    left: FloatArray
-    is_fitted: bool
 
     def gyroscope(self, before: SensorCalibration) -> SensorCalibration:
         """The gyro with these parameters."""

@@ -19,7 +19,7 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_
 from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Near
-from trihedron.estimate.session.start import Log, begun, is_enough, near_one_another, scale_matrix
+from trihedron.estimate.session.start import Log, begun, is_enough, near_one_another
 from trihedron.probability import FALSE_ALARM, chdtri, fdtrc
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
 from trihedron.session.noise import NOISE_DOF
@@ -30,17 +30,17 @@ def calibrate_moves(
     segments: Segments,
     accelerometer: SensorCalibration,
     gravity_m_s2: float,
-    nominal_scale: FloatArray | float | None = None,
+    nominal: float | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Calibrate the gyro from the tilt errors after rotations between poses (equations 5.1-5.7).
 
-    ``nominal_scale`` (3, 3) or a number [rad/s per raw unit] is needed where the moves do not determine an initial one.
+    ``nominal`` [rad/s per raw unit] is needed where the moves do not determine an initial one.
 
     The ``accelerometer`` is lower-triangular, its covariance enters the gyro's. Raises
     ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
-    log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True)
-    found = solved(log, nominal_scale)
+    log = Log(recording, segments, accelerometer, gravity_m_s2, is_given=True, nominal=nominal)
+    found = solved(log)
     return beside_given(accelerometer, found), found.findings
 
 
@@ -84,13 +84,13 @@ class _Fit:
         return tuple(np.flatnonzero(~self.used & ~self.measured.is_lost).tolist())
 
 
-def solved(log: Log, nominal_scale: FloatArray | float | None = None) -> SolvedSession:
+def solved(log: Log) -> SolvedSession:
     """Fit the session model (docs/model-session.md).
 
     Raises ``InputError`` when a sensor or every move is missing, or no initial scale can be determined.
     """
     measured = measure_moves(log.recording, log.segments, log.accelerometer)
-    near = begun(log, measured, None if nominal_scale is None else scale_matrix(nominal_scale))
+    near = begun(log, measured)
     found = _fitted(log, measured, near)
     # Nonlinearities and delays would be taken for filters: that there is one the noise at rest must show.
     if found.solution.smooths_more_than_means and _has_low_pass(log.recording):
@@ -212,7 +212,7 @@ def calibrate_joint(
     recording: Recording,
     segments: Segments,
     alone: Calibration,
-    nominal_scale: FloatArray | float | None = None,
+    nominal: float | None = None,
     known_scale: FloatArray | None = None,
 ) -> Calibration:
     """Fit ``S_f, b_f, S_ω`` to the norm of every pose and the rotation of every move at once (equation 5.7).
@@ -220,10 +220,12 @@ def calibrate_joint(
     The noise of a pose's mean enters its norm and both neighbouring moves, with its full covariance. The frame is
     lower-triangular: the data do not determine the rotation of the triad against the case. The fit starts from
     ``alone``, the accelerometer calibrated by poses, whose residuals it replaces, and from the gyro's ``known_scale``
-    (3, 3) where turns show it; ``nominal_scale`` and errors are those of ``calibrate_moves``.
+    (3, 3) where turns show it; ``nominal`` and errors are those of ``calibrate_moves``.
     """
-    log = Log(recording, segments, alone.accelerometer, alone.gravity_m_s2, is_given=False, scale=known_scale)
-    found = solved(log, nominal_scale)
+    log = Log(
+        recording, segments, alone.accelerometer, alone.gravity_m_s2, is_given=False, nominal=nominal, scale=known_scale
+    )
+    found = solved(log)
     solution, left_out = found.solution, found.held_out
     quality = norm_quality(solution, None if left_out is None else (left_out.norm, left_out.norm_sigma))
     has_temperature = recording.temperature_degc is not None

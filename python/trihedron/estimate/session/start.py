@@ -32,7 +32,8 @@ USUAL_RAD = 0.03
 @dataclass(frozen=True, eq=False)
 class Log:
     """Input of a session's fit; an accelerometer that ``is_given`` is fixed, sensors that are ``is_filtered`` have a
-    low-pass. ``scale`` (3, 3) is the gyro's where it is known beforehand, to begin with."""
+    low-pass. ``scale`` (3, 3) is the gyro's where it is known beforehand, to begin with; ``nominal`` [rad/s per raw
+    unit] where the moves do not determine a start."""
 
     recording: Recording
     segments: Segments
@@ -40,6 +41,7 @@ class Log:
     gravity_m_s2: float
     is_given: bool
     is_filtered: bool = False
+    nominal: float | None = None
     scale: FloatArray | None = None
 
     def observed(self, measured: MoveMeasurements, used: BoolArray, near: Near) -> Observed:
@@ -100,8 +102,8 @@ def is_enough(used: BoolArray) -> bool:
     return 2 * int(np.count_nonzero(used)) > N_GYROSCOPE + 2
 
 
-def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> Near:
-    """Initial values of a session's fit; ``nominal`` (3, 3) is the gyro's scale where it is given.
+def begun(log: Log, measured: MoveMeasurements) -> Near:
+    """Initial values of a session's fit.
 
     Raises ``InputError`` as :func:`initial_scale`, and when the gyro clipped in every move.
     """
@@ -110,7 +112,7 @@ def begun(log: Log, measured: MoveMeasurements, nominal: FloatArray | None) -> N
     S_a, b_a, R = lower(log.accelerometer.S, log.accelerometer.b)
     first = log.scale
     if first is None:
-        first = initial_scale(log.recording, measured, log.accelerometer, nominal)
+        first = initial_scale(log.recording, measured, log.accelerometer, log.nominal)
     return S_a, b_a, R @ along_paths(measured, log.accelerometer, first)
 
 
@@ -130,17 +132,6 @@ def usual_deg(angle_deg: FloatArray, measured: MoveMeasurements, S_a: FloatArray
 
 FEWEST_MOVES = 3
 """Fewest moves: S has nine elements, and a move determines three at most."""
-
-
-def scale_matrix(nominal_scale: FloatArray | float) -> FloatArray:
-    """Nominal scale (3, 3), rad/s per raw unit, from a number or a matrix.
-
-    Raises ``InputError`` when it is neither.
-    """
-    value = np.asarray(nominal_scale, dtype=np.float64)
-    if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
-        raise InputError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
-    return value * np.eye(3) if value.ndim == 0 else value
 
 
 def integral_start(
@@ -179,7 +170,7 @@ def integral_start(
 
 
 def initial_scale(
-    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, nominal: FloatArray | None
+    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, nominal: float | None
 ) -> FloatArray:
     """Initial scale (3, 3): that of :func:`integral_start`, else the nominal one, else that of the unit.
 
@@ -188,11 +179,9 @@ def initial_scale(
     linear = integral_start(recording, measured, accelerometer)
     if linear is not None:
         return linear
-    unit = rate_to_si(recording.gyroscope_unit)
-    if nominal is not None:
-        return nominal
-    if unit is not None:
-        return unit * np.eye(3)
+    known = nominal or rate_to_si(recording.gyroscope_unit)
+    if known is not None:
+        return known * np.eye(3)
     if np.any(measured.is_lost):
         raise GyroClippedError(measured)
     raise InputError(
