@@ -48,6 +48,14 @@ def test_repeats_and_missing_faces_are_taken_as_they_come():
     assert (seen.rank, seen.n_parameters, seen.advice) == (12, 12, ("-Y up", "-Z up"))
 
 
+def test_four_faces_at_two_headings_each_show_that_the_table_leans():
+    # Four placements have as many components as there are parameters: their headings alone show a lean.
+    faces = np.repeat([1, -1, 2, 3], 2)
+    sensor, findings = calibrate_faces(face_readings(faces, 1e-3, 3, tilt_deg=0.5), 1e-3, G, raw_unit="m/s^2")
+    assert FindingCode.TABLE_TILT in codes(findings)
+    assert np.all(np.isfinite(sensor.sigma_S))
+
+
 @pytest.mark.parametrize("faces", [[1, -1, 2, -2], [1, 2, 3], [1, -1, 1, -1]])
 def test_faces_that_leave_parameters_free_are_refused_by_name(faces):
     with pytest.raises(ValueError, match=r"missing: .*[+-]Z up"):
