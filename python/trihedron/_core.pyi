@@ -177,6 +177,9 @@ def triad_extremes(readings: FloatArray) -> list[tuple[float, int, float, int]]:
 def triad_repeats(
     readings: FloatArray,
 ) -> tuple[list[int], list[int], list[int], npt.NDArray[np.uint8], int, int | None]: ...
+def triad_leaps(
+    readings: FloatArray, noise: Sequence[float] | FloatArray, least: float
+) -> tuple[npt.NDArray[np.int64], FloatArray, FloatArray]: ...
 def readings_near(
     readings: FloatArray, axis: int, value: float, depth: float
 ) -> tuple[int, float, npt.NDArray[np.int64]]: ...

@@ -1,7 +1,9 @@
-//! Statistics of every log: extreme values, readings that equal the one before, missing readings.
+//! Statistics of every log: extreme values, readings that equal the one before or leap away, missing readings.
 
+mod leaps;
 mod repeats;
 
+pub use leaps::{Leap, leaps};
 pub use repeats::{Repeats, WINDOW, repeats};
 
 use rayon::prelude::*;

@@ -10,6 +10,7 @@ use crate::audit;
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(triad_extremes, module)?)?;
     module.add_function(wrap_pyfunction!(triad_repeats, module)?)?;
+    module.add_function(wrap_pyfunction!(triad_leaps, module)?)?;
     module.add_function(wrap_pyfunction!(readings_near, module)?)
 }
 
@@ -53,6 +54,35 @@ fn triad_repeats<'py>(
         windows,
         found.missing,
         found.first_missing,
+    ))
+}
+
+/// Rows `(k,)` with a reading at least `least` standard errors from its neighbours' prediction; by how much, and the
+/// standard errors, `(k, 3)` each.
+#[pyfunction]
+fn triad_leaps<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    noise: [f64; 3],
+    least: f64,
+) -> PyResult<(
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+)> {
+    let flat = flat3("readings", &readings)?;
+    let found = super::run(py, || Ok(audit::leaps(as_rows(&flat), &noise, least)))?;
+    let rows = found
+        .iter()
+        .map(|one| i64::try_from(one.row).unwrap_or(i64::MAX));
+    let of = |part: fn(&audit::Leap) -> [f64; 3]| {
+        let values: Vec<f64> = found.iter().flat_map(part).collect();
+        PyArray1::from_vec(py, values).reshape([found.len(), 3])
+    };
+    Ok((
+        PyArray1::from_iter(py, rows),
+        of(|one| one.away)?,
+        of(|one| one.error)?,
     ))
 }
 

@@ -14,6 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
+from trihedron.read.audit.invalid import without_invalid
 from trihedron.read.audit.motionless import audit_motionless_accelerometer, audit_motionless_gyro
 from trihedron.read.audit.readings import audit_readings, audit_seam, audit_steps
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
@@ -139,10 +140,12 @@ def audited(
 ) -> Recording:
     """The recording, with units determined, clock and readings audited, and all rows accounted for."""
     sensors = settled(sensors)
-    findings = list(sensors.findings)
+    rate = _rate_hz(sensors)
+    of_clock = audit_timing(sensors, rate) + audit_pace(sensors) if sensors.has_clock else []
+    sensors, invalid = without_invalid(sensors, rate)
+    findings = [*sensors.findings, *invalid]
     _accounted(sensors, findings)
     time_s = sensors.time_s
-    rate = _rate_hz(sensors)
     present = sensors.triads
     extremes = {name: _finite_extremes(triad) for name, triad in present.items()}
     windows = look(present, rate)
@@ -157,8 +160,7 @@ def audited(
         judged = _judged_gyro(sensors, rate, windows, gyroscope_unit, extremes["gyroscope"])
         gyr_unit = RateUnit(judged.unit)
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
-    if sensors.has_clock:
-        findings += audit_timing(sensors, rate) + audit_pace(sensors)
+    findings += of_clock
     facts = facts_in(present, windows, extremes)
     counter = sensors.columns.counter
     if counter is not None:

@@ -41,6 +41,7 @@ class FindingCode(str, Enum):
     TIME_BACKWARD = "time-backward"
     CLOCKS_MERGED = "clocks-merged"
     STUCK_VALUES = "stuck-values"
+    INVALID_READINGS = "invalid-readings"
     CLIPPING = "clipping"
     REPEATED_ROWS = "repeated-rows"
     NON_FINITE = "non-finite"

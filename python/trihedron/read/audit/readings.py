@@ -1,4 +1,4 @@
-"""Invalid readings: not finite, stuck, repeated, clipped, or with a resolution coarser than the noise."""
+"""Findings on readings: not finite, repeated, clipped, or with a resolution coarser than the noise."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trihedron import _core
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.quiet import Windows
-from trihedron.quantiles import quantile
+from trihedron.read.audit.repeats import Repeats
 from trihedron.read.clock.rate import usual_step
 from trihedron.read.turning import Turning
 from trihedron.records import Finding, FindingCode, Severity
@@ -110,8 +109,8 @@ def _per_unit(step_si: float, sensor: str) -> float:
 Place = Callable[[int], str]
 LAGS = 8
 """Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
-MANY, LONG, HALF = 0.05, 0.1, 0.5
-"""Shares of a log that are not finite, stuck, or repeated, from which on the finding is serious."""
+MANY, HALF = 0.05, 0.5
+"""Shares of a log that are not finite, or repeated, from which on the finding is serious."""
 
 
 def audit_readings(
@@ -123,12 +122,7 @@ def audit_readings(
     if len(readings) < 8:
         return findings
     findings += _repeated(sensor, readings, repeats, place)
-    limits = facts.limits
-    findings += audit_clipping(sensor, limits, windows, place)
-    for k in range(3):
-        at_wall = any(w.axis == k and w.value == readings[repeats.longest_start[k], k] for w in limits)
-        # A stuck triad is reported as repeated rows, a value stuck at a range limit as clipping.
-        findings += [] if at_wall else _stuck(sensor, k, repeats, readings, facts.step[k], windows, place)
+    findings += audit_clipping(sensor, facts.limits, windows, place)
     findings += _coarse(sensor, facts.step, windows)
     return findings
 
@@ -192,41 +186,6 @@ def _equal_apart(readings: FloatArray, longest: int) -> float:
     return sum(shares) / max(len(shares), 1)
 
 
-def _stuck(
-    sensor: str, k: int, repeats: Repeats, readings: FloatArray, step: float, windows: Windows | None, place: Place
-) -> list[Finding]:
-    """A finding where one axis keeps a value far longer than by chance.
-
-    Where the LSB exceeds the noise, a value may be constant for a whole pose; then the other axes must move.
-    """
-    longest, start = int(repeats.longest[k]), int(repeats.longest_start[k])
-    chance = repeats.chance_outside(k, start, longest)
-    if longest <= max(longest_by_chance(repeats.n, chance), 2.0 * repeats.longest[3]):
-        return []
-    if windows is not None:
-        others = [j for j in range(3) if j != k]
-        noise = windows.quiet_noise(sensor)
-        stretch = readings[start : start + longest, others]
-        stretch = stretch[np.isfinite(stretch).all(axis=1)]
-        spread = stretch.std(axis=0) if len(stretch) else np.zeros(2)
-        moving = spread > 5.0 * np.maximum(noise[others], step)
-        if step > 2.0 * noise[k] and not moving.any():
-            return []
-    return [
-        Finding.of(
-            FindingCode.STUCK_VALUES,
-            severity=Severity.WARNING if longest < LONG * repeats.n else Severity.SERIOUS,
-            sensor=short(sensor),
-            axis_name=AXES[k],
-            value=readings[start, k],
-            longest_run=longest,
-            where=place(start),
-            axis=k,
-            sample=start,
-        )
-    ]
-
-
 def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Finding]:
     """A finding where the LSB is more than twice the noise."""
     if windows is None:
@@ -237,47 +196,6 @@ def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Fin
         return []
     numbers = {f"{name}_step": step for name, step, _ in axes}
     return [Finding.of(FindingCode.COARSE_RESOLUTION, sensor=short(sensor), axes=axes, numbers=numbers)]
-
-
-# Readings that equal the previous one: their number, the longest run, and the longest run expected by chance.
-
-CHUNK = 1 << 20
-"""Rows after which windows restart."""
-WINDOW = 64
-"""Rows of a window."""
-
-
-class Repeats:
-    """Readings that equal the previous one: counts, longest runs and their chance, per axis and for the triad."""
-
-    def __init__(self, readings: FloatArray) -> None:
-        self.n = len(readings)
-        count, longest, start, windows, self.n_missing, self.first_missing = _core.triad_repeats(readings)
-        self.count = np.array(count, dtype=np.int64)
-        self.longest = np.array(longest, dtype=np.int64)
-        self.longest_start = np.array(start, dtype=np.int64)
-        # Windows restart every 2²⁰ rows; an incomplete window is used only where it is the only one.
-        left = (self.n - 1) % CHUNK
-        of_left = windows[-1:] / max(left, 1) if 0 < left < WINDOW else np.zeros((0, 4))
-        whole = windows[: (self.n - 1) // WINDOW] / float(WINDOW)
-        self.rates = np.concatenate([whole, of_left]) if self.n > 1 else np.zeros((1, 4))
-        self.starts = WINDOW * np.arange(len(self.rates))
-
-    def chance_outside(self, k: int, start: int, length: int) -> float:
-        """Share of equal neighbours on axis ``k`` where they are frequent (ninth decile over windows of 64 rows), in
-        the log outside ``length`` rows from ``start``: a channel frozen for half of it is no measure of chance."""
-        first = self.starts
-        rates = self.rates[(first + WINDOW <= start) | (first >= start + length), k]
-        return float(quantile(rates, 0.9)) if len(rates) else 1.0
-
-
-def longest_by_chance(n: int, probability: float) -> float:
-    """Run length of equal neighbours that occurs by chance in n rows in one of a thousand logs."""
-    if probability <= 0.0:
-        return 4.0
-    if probability >= 1.0:
-        return float(n)
-    return 4.0 - math.log(1000.0 * n) / math.log(probability)
 
 
 # Gravity that rotates between two samples without a gyro rate: both sensors' axes changed, or rows are cut.

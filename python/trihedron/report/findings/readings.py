@@ -39,12 +39,29 @@ ENTRIES = {
         numbers=("sample",),
         or_severity=SERIOUS,
     ),
+    (Code.INVALID_READINGS, "isolated", WARNING): Words(
+        "{count:# single reading} {count:?leaps|leap} away from both neighbours, on one axis alone or with one value "
+        "on all ({counts:each}; first: {where}).",
+        "Errors of the bus or of the logger: motion and shocks move all axes.",
+        "These rows are excluded; shorten the cable or lower the bus clock before the next log.",
+        numbers=("sample",),
+        or_severity=SERIOUS,
+        lines={"counts": "{v0} {v1}"},
+    ),
+    (Code.INVALID_READINGS, "wrapped", WARNING): Words(
+        "{count:# reading} {count:?comes|come} out at the opposite range limit ({counts:each}; first: {where}).",
+        "Readings beyond the range of their integers, which overflow.",
+        "These rows are excluded; choose a larger range of the sensor, or a wider integer in the logger.",
+        numbers=("sample",),
+        or_severity=SERIOUS,
+        lines={"counts": "{v0} {v1}"},
+    ),
     (Code.STUCK_VALUES, "", WARNING): Words(
-        "{sensor} {axis_name:axis} stays at {value:.7g} for {longest_run} samples from {where}, far longer than "
-        "chance.",
-        "A frozen channel, clipping, or a bus that answers with an old value.",
-        "Cut these rows out of the log and run again.",
-        numbers=("axis", "sample"),
+        "{sensor} {is_triad:?repeats all axes|{axis_name:axis} stays at {value:.7g}} for {longest_run} samples from "
+        "{where}, far longer than chance ({count} in all).",
+        "A frozen channel, or a bus that answers with an old value.",
+        "These rows are excluded; repair the channel before the next log.",
+        numbers=("axis", "sample", "axis_name", "value"),
         or_severity=SERIOUS,
     ),
     (Code.STUCK_VALUES, "motionless", SERIOUS): Words(

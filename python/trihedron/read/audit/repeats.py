@@ -1,0 +1,47 @@
+"""Readings that equal the previous one: their number, the longest run, and the longest run expected by chance."""
+
+import math
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.arrays import FloatArray
+from trihedron.quantiles import quantile
+
+CHUNK = 1 << 20
+"""Rows after which windows restart."""
+WINDOW = 64
+"""Rows of a window."""
+
+
+class Repeats:
+    """Readings that equal the previous one: counts, longest runs and their chance, per axis and for the triad."""
+
+    def __init__(self, readings: FloatArray) -> None:
+        self.n = len(readings)
+        count, longest, start, windows, self.n_missing, self.first_missing = _core.triad_repeats(readings)
+        self.count = np.array(count, dtype=np.int64)
+        self.longest = np.array(longest, dtype=np.int64)
+        self.longest_start = np.array(start, dtype=np.int64)
+        # Windows restart every 2²⁰ rows; an incomplete window is used only where it is the only one.
+        left = (self.n - 1) % CHUNK
+        of_left = windows[-1:] / max(left, 1) if 0 < left < WINDOW else np.zeros((0, 4))
+        whole = windows[: (self.n - 1) // WINDOW] / float(WINDOW)
+        self.rates = np.concatenate([whole, of_left]) if self.n > 1 else np.zeros((1, 4))
+        self.starts = WINDOW * np.arange(len(self.rates))
+
+    def chance_outside(self, k: int, start: int, length: int) -> float:
+        """Share of equal neighbours on axis ``k`` where they are frequent (ninth decile over windows of 64 rows), in
+        the log outside ``length`` rows from ``start``: a channel frozen for half of it is no measure of chance."""
+        first = self.starts
+        rates = self.rates[(first + WINDOW <= start) | (first >= start + length), k]
+        return float(quantile(rates, 0.9)) if len(rates) else 1.0
+
+
+def longest_by_chance(n: int, probability: float) -> float:
+    """Run length of equal neighbours that occurs by chance in n rows in one of a thousand logs."""
+    if probability <= 0.0:
+        return 4.0
+    if probability >= 1.0:
+        return float(n)
+    return 4.0 - math.log(1000.0 * n) / math.log(probability)
