@@ -60,23 +60,22 @@ pub fn halves(blocks: &[f64], channels: usize, stretches: &[(usize, usize)]) -> 
     out
 }
 
-/// `(m + 1, channels)` sums of the blocks before each, about their mean: a large offset costs no precision.
+/// `(m + 1, channels)` sums of the blocks before each, about their mean: a large offset costs no precision. A block
+/// without readings, which no stretch contains, adds nothing.
 fn running_total(blocks: &[f64], channels: usize) -> Vec<f64> {
-    let n = blocks.len() / channels.max(1);
+    let rows = || blocks.chunks_exact(channels.max(1));
     let mut mean = vec![0.0; channels];
-    for row in blocks.chunks_exact(channels.max(1)) {
+    let present = rows().filter(|row| row.iter().all(|v| v.is_finite()));
+    for (n, row) in present.enumerate() {
         for (mean, value) in mean.iter_mut().zip(row) {
-            *mean += value / n as f64;
+            *mean += (value - *mean) / (n + 1) as f64;
         }
     }
-    let mut total = Vec::with_capacity((n + 1) * channels);
-    let mut sum = vec![0.0; channels];
-    total.extend_from_slice(&sum);
-    for row in blocks.chunks_exact(channels.max(1)) {
-        for ((sum, value), mean) in sum.iter_mut().zip(row).zip(&mean) {
-            *sum += value - mean;
-        }
-        total.extend_from_slice(&sum);
+    let mut total = vec![0.0; channels];
+    total.reserve_exact(blocks.len());
+    for (at, value) in blocks.iter().enumerate() {
+        let change = value - mean[at % channels];
+        total.push(total[at] + if change.is_finite() { change } else { 0.0 });
     }
     total
 }

@@ -141,6 +141,9 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     in_log = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
     links = np.array([[move.pose_before, move.pose_after] for move in moves], dtype=np.int64)
     rows, edges = rows_beside(in_log, BESIDE, recording.n_samples)
+    # A row that lacks a reading is a lost sample, as one that was not logged.
+    is_whole = np.isfinite(gyroscope[rows]).all(axis=1) & np.isfinite(raw_force[rows]).all(axis=1)
+    rows, edges = rows[is_whole], np.concatenate([[0], np.cumsum(is_whole)])[edges]
     reading, bias = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
     # The variance of pose means includes their rounding error (docs/segmentation.md).
@@ -164,7 +167,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
             rate[first:last] += hidden[first:last] * np.linspace(pair[0], pair[1], last - first)
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
-    steps, nominal, jitter = _steps_of(recording)
+    nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
         links=links,
         rows=rows,
@@ -179,7 +182,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         sigma_time_s=jitter,
         nominal_step_s=nominal,
         clipped_s=clipped_time(clipped, in_log, nominal),
-        is_gapped=np.array([np.max(steps[a : b - 1], initial=0.0) > GAP_STEPS * nominal for a, b in in_log]),
+        is_gapped=np.array([np.max(np.diff(time_s[a:b]), initial=0.0) > GAP_STEPS * nominal for a, b in edges]),
         bias_excess=excess,
         rate=rate,
         force=raw_force[rows],
@@ -246,11 +249,11 @@ def _by_codes(
     return out, own
 
 
-def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
-    """Time steps (n - 1,), the median step, and the standard deviation of a timestamp, s."""
+def _steps_of(recording: Recording) -> tuple[float, float]:
+    """The median time step, and the standard deviation of a timestamp, s."""
     steps = np.diff(recording.time_s)
     nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
-    return steps, nominal, median(np.abs(steps - nominal)) * MAD_TO_SIGMA / np.sqrt(2.0)
+    return nominal, median(np.abs(steps - nominal)) * MAD_TO_SIGMA / np.sqrt(2.0)
 
 
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:

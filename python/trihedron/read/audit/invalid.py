@@ -179,15 +179,17 @@ def wrapped_rows(values: FloatArray, noise: float) -> BoolArray:
     at = 2 + np.flatnonzero(np.abs(change[2:-2]) > 0.5 * np.ptp(x))
     if len(at) < 2:
         return out
-    # Their median is short of the range by the motion's own step, which the second round adds.
-    span = max(median(np.abs(change[at])), float(np.ptp(x)))
+    span = float(np.ptp(x))
+    # The readings stop short of the range, by the motion's own step: the second round has it.
     for _ in range(2):
         moved = change - span * np.round(change / span)
         usual, error = 0.5 * (moved[at - 1] + moved[at + 1]), np.hypot(2.0 * noise, moved[at + 1] - moved[at - 1])
-        span = max(median(np.abs(change[at] - usual)), float(np.ptp(x)))
-    away = (np.abs(change[at] - usual) - span) / error
-    ratio = np.log(span / error) - 0.5 * away**2 - 0.5 * np.log(2.0 * np.pi)
-    if ratio[ratio > 0.0].sum() + LN_RARE <= 0.0:
+        sizes = np.abs(change[at] - usual)
+        ratio = np.log(span / error) - 0.5 * ((sizes - span) / error) ** 2 - 0.5 * np.log(2.0 * np.pi)
+        span = max(median(sizes[ratio > 0.0]), span) if np.any(ratio > 0.0) else span
+    # A jump beside another one is there and back: an isolated reading, which proves no range.
+    is_run = ~np.isin(at - 1, at) & ~np.isin(at + 1, at)
+    if ratio[is_run & (ratio > 0.0)].sum() + LN_RARE <= 0.0:
         return out
     turns = np.concatenate([[0], np.cumsum(np.round(change / span))])
     kinds, count = np.unique(turns, return_counts=True)
