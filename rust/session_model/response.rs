@@ -7,7 +7,6 @@ use super::N_SCATTER;
 use super::gaps::GAP;
 use super::moves::{Carried, Move, MoveCovariance, MoveModel, MoveNoise, N_MOVE};
 use super::sample_noise::of_samples;
-use crate::poisson::StepWeights;
 use crate::rotation::skew;
 
 /// Derivatives of the five residuals by rate and force at each sample.
@@ -92,16 +91,6 @@ pub fn respond(
                 .tr_mul(&(carried.force[step.to] - carried.force[step.from]));
             let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
             velocity.ger(var, &jump, &jump, 1.0);
-
-            if is_unknown {
-                // A peak that was lost leaves no jump, but slopes towards it on both sides.
-                let peak = zeroth * beyond_chord(one, i, &carried.rate);
-                covariance.ger(1.0, &peak, &peak, 1.0);
-                let peak =
-                    carried.attitude[step.from].tr_mul(&beyond_chord(one, i, &carried.force));
-                let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
-                velocity.ger(1.0, &peak, &peak, 1.0);
-            }
         }
     }
     let [white, unresolved] = of_samples(one, move_model, noise, &by_rate, &by_force);
@@ -111,20 +100,6 @@ pub fn respond(
         covariance: covariance + white,
         unresolved,
         lever,
-    }
-}
-
-/// `h² (s₁ - s₂)/12`: area between the chord of step `i` and the cubic with the slopes of `values` on both sides.
-fn beyond_chord(one: &Move, i: usize, values: &[Vector3<f64>]) -> Vector3<f64> {
-    let slope = |step: &StepWeights| (values[step.to] - values[step.from]) / step.h;
-    match (
-        i.checked_sub(1).and_then(|k| one.steps.get(k)),
-        one.steps.get(i + 1),
-    ) {
-        (Some(before), Some(after)) => {
-            (slope(before) - slope(after)) * (one.steps[i].h.powi(2) / 12.0)
-        }
-        _ => Vector3::zeros(),
     }
 }
 
