@@ -79,3 +79,15 @@ def test_a_stuck_axis_costs_its_own_rows_and_no_other_pose():
     segments = trihedron.segment(recording)
     assert segments.n_poses == healthy.n_poses
     assert not any(pose.is_unsteady for pose in segments.poses)
+
+
+def test_rows_without_readings_inside_moves_cost_neither_the_poses_nor_the_gyro():
+    table = table_of(simulated(hand_session(n_poses=14, pose_s=3.0, move_s=1.5)))
+    segments = trihedron.segment(read(table))
+    for move in segments.moves[2::4]:
+        middle = (move.start + move.stop) // 2
+        table[middle - 10 : middle + 10, 1:] = np.nan
+    result = trihedron.calibrate(read(table), gravity_m_s2=9.81)
+    assert result.segments.n_poses == segments.n_poses
+    assert result.gyroscope is not None
+    assert not [one for one in result.findings if one.code is FindingCode.POSE_SETTLING]
