@@ -26,7 +26,7 @@ pub fn leaps(rows: &[[f64; 3]], noise: &[f64; 3], least: f64) -> Vec<Leap> {
     if rows.len() < width {
         return Vec::new();
     }
-    let starts: Vec<usize> = (0..rows.len() - width + 1).step_by(SHARE).collect();
+    let starts: Vec<usize> = (0..=rows.len() - width).step_by(SHARE).collect();
     let of_share = |&start: &usize| {
         let stop = (start + SHARE + width - 1).min(rows.len());
         let windows = rows[start..stop].windows(width).enumerate();

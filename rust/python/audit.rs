@@ -57,6 +57,12 @@ fn triad_repeats<'py>(
     ))
 }
 
+type LeapNumbers<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
 /// Rows `(k,)` with a reading at least `least` standard errors from its neighbours' prediction; by how much, and the
 /// standard errors, `(k, 3)` each.
 #[pyfunction]
@@ -65,11 +71,7 @@ fn triad_leaps<'py>(
     readings: PyReadonlyArray2<'py, f64>,
     noise: [f64; 3],
     least: f64,
-) -> PyResult<(
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-)> {
+) -> PyResult<LeapNumbers<'py>> {
     let flat = flat3("readings", &readings)?;
     let found = super::run(py, || Ok(audit::leaps(as_rows(&flat), &noise, least)))?;
     let rows = found

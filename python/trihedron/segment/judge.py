@@ -10,7 +10,7 @@ from trihedron.probability import FALSE_ALARM
 from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
-from trihedron.segment.channels import Channels
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import RangeEnd, is_cut
 from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
@@ -138,12 +138,14 @@ def judge_log(
     """Findings on the log as a whole: number of poses, slow rotation, no initial pose."""
     found: list[Finding] = []
     duration = recording.duration_s
+    # Five whole blocks make a window, and a block begins anywhere in the log.
+    least_s = max(LEAST_POSE_S, (WINDOW_BLOCKS + 1) * channels.step_s)
     if not runs:
         is_assumed = any(one.code is FindingCode.RATE_ASSUMED for one in recording.findings)
         is_short = duration < POSES_FOR_NINE * LEAST_POSE_S
         said = Finding.of(
-            FindingCode.NOT_STATIC, rows=recording.n_samples, duration_s=duration, poses=0, least_s=LEAST_POSE_S,
-            is_assumed=is_assumed, is_short=is_short,
+            FindingCode.NOT_STATIC, rows=recording.n_samples, duration_s=duration, poses=0, least_s=least_s,
+            is_assumed=is_assumed, is_short=is_short, is_slow=least_s > LEAST_POSE_S,
         )  # fmt: skip
         return [said]
     # Shorter ranges are the ends of moves.
@@ -157,7 +159,7 @@ def judge_log(
         found.append(Finding.of(FindingCode.NO_INITIAL_POSE, first_pose_s=_start_s(recording, poses[0])))
     if (n := len(poses)) < POSES_FOR_NINE:
         found.append(
-            Finding.of(FindingCode.FEW_POSES, poses=n, duration_s=duration, needed=POSES_FOR_NINE, least_s=LEAST_POSE_S)
+            Finding.of(FindingCode.FEW_POSES, poses=n, duration_s=duration, needed=POSES_FOR_NINE, least_s=least_s)
         )
     return found
 

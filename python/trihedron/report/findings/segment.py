@@ -41,8 +41,8 @@ ENTRIES = {
         "No pose of {least_s:.2g} s or more in {rows:# row}, {duration_s:.1f} s of log{is_assumed:? at an assumed rate "
         "(no time column)|}.",
         "{is_short:?The log is too short, as a table of means of poses is: the readings themselves are needed|The "
-        "sensor was moving, or held in the hand, all the time}.",
-        "Log again: put the case down for several seconds in each pose.",
+        "sensor was moving, or held in the hand{is_slow:?, or its poses were too short for this rate|, all the time}}.",
+        "Log again: put the case down for several seconds in each pose{is_slow:?, at 50 Hz or more|}.",
         numbers=("poses",),
     ),
     (Code.POSES_VIBRATE, "", SERIOUS): Words(
