@@ -142,6 +142,9 @@ def audited(
     sensors = settled(sensors)
     rate = _rate_hz(sensors)
     of_clock = audit_timing(sensors, rate) + audit_pace(sensors) if sensors.has_clock else []
+    counter = sensors.columns.counter
+    if counter is not None:
+        of_clock += audit_counter(sensors.column(counter), sensors.table.label(counter), sensors.place)
     sensors, invalid = without_invalid(sensors, rate)
     findings = [*sensors.findings, *invalid]
     _accounted(sensors, findings)
@@ -162,9 +165,6 @@ def audited(
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
     findings += of_clock
     facts = facts_in(present, windows, extremes)
-    counter = sensors.columns.counter
-    if counter is not None:
-        findings += audit_counter(sensors.column(counter), sensors.table.label(counter), sensors.place)
     for done, (name, triad) in enumerate(present.items()):
         if progress is not None:
             progress((done + 1) / (len(present) + 1), f"checking the {name}")

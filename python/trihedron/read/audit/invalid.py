@@ -252,6 +252,7 @@ def _stuck_finding(sensor: str, k: int, readings: FloatArray, runs: IntArray, se
         value=readings[first, k % 3],
         longest_run=int(length.max()) + 1,
         count=int(length.sum()),
+        is_excluded=bool(length.sum() < HALF * len(readings)),
         where=sensors.place(first),
         axis=k,
         sample=first,

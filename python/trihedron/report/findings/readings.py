@@ -60,7 +60,7 @@ ENTRIES = {
         "{sensor} {is_triad:?repeats all axes|{axis_name:axis} stays at {value:.7g}} for {longest_run} samples from "
         "{where}, far longer than chance ({count} in all).",
         "A frozen channel, or a bus that answers with an old value.",
-        "These rows are excluded; repair the channel before the next log.",
+        "{is_excluded:?These rows are excluded; repair|Repair} the channel before the next log.",
         numbers=("axis", "sample", "axis_name", "value"),
         or_severity=SERIOUS,
     ),
