@@ -91,3 +91,12 @@ def test_rows_without_readings_inside_moves_cost_neither_the_poses_nor_the_gyro(
     assert result.segments.n_poses == segments.n_poses
     assert result.gyroscope is not None
     assert not [one for one in result.findings if one.code is FindingCode.POSE_SETTLING]
+
+
+def test_a_packet_counter_does_not_count_excluded_rows_as_lost():
+    table = counts(4)
+    table[[850, 1650, 2450, 3250], [4, 5, 6, 4]] = -32767.0
+    names = ("time_s", "ax", "ay", "az", "gx", "gy", "gz", "PacketCounter")
+    recording = read_recording(dict(zip(names, (*table.T, np.arange(N, dtype=float)), strict=True)))
+    assert found(recording, FindingCode.INVALID_READINGS)[0].numbers["count"] == 4
+    assert not found(recording, FindingCode.SAMPLES_LOST) + found(recording, FindingCode.TIME_GAP)
