@@ -167,6 +167,19 @@ def test_apply_follows_temperature_inside_the_range_and_says_so_outside(thermal,
     assert [f.code.value for f in without.findings if f.severity is Severity.SERIOUS] == ["temperature-missing"]
 
 
+def test_a_calibration_that_follows_temperature_is_verified_and_ranked_at_the_temperature_of_the_log(thermal):
+    log = recorded(at(45.0), 91, temperature_degc=45.0)
+    own = trihedron.calibrate(recorded(at(45.0), 92, temperature_degc=45.0), gravity_m_s2=G)
+    judged = trihedron.verify(thermal, log)
+    # S and b of the reference temperature, 20 °C, are 50 mm/s² away.
+    assert judged.is_passed
+    assert judged.verification.norm_rms < 6e-3
+    ranking = trihedron.rank([own, thermal], log, gravity_m_s2=G)
+    assert not any(one.is_rejected for one in ranking.candidates)
+    hot = trihedron.verify(thermal, replace(log, temperature_degc=np.full(log.n_samples, 90.0)))
+    assert "outside-valid-range" in [f.code.value for f in hot.findings]
+
+
 def test_hysteresis_between_heating_and_cooling_is_found_and_not_invented():
     rng = np.random.default_rng(8)
     picked = [k for k, p in enumerate(PARAMETERS) if p.id == "gyro-bias"]

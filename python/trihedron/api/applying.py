@@ -131,18 +131,15 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
         findings = (*findings, Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "calibration-has-none"))
     if accelerometer is None and gyroscope is None:
         raise InputError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
-    followed = thermally_corrected(known, recording)
-    if followed is None:
-        followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
-    findings = (*findings, *_static_force(followed[0], recording.rate_hz, known))
+    force = _corrected(accelerometer, known.accelerometer)
     return replace(
         recording,
-        accelerometer=followed[0],
-        gyroscope=followed[1],
+        accelerometer=force,
+        gyroscope=_corrected(gyroscope, known.gyroscope),
         accelerometer_unit=AccelerationUnit.M_S2,
         gyroscope_unit=RateUnit.RAD_S,
         source=f"{recording.source}, calibrated",
-        findings=findings,
+        findings=(*findings, *_static_force(force, recording.rate_hz, known)),
     )
 
 
@@ -157,13 +154,14 @@ def _static_force(force: FloatArray | None, rate_hz: float, known: Calibration) 
 
 
 def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    """Raw readings with the effects of an extended calibration compensated, so that ``S raw + b`` is valid.
+    """Raw readings for which ``S raw + b`` is valid: the effects of an extended calibration are compensated, the change
+    with temperature of one that follows it is taken off. The recording itself where the calibration is linear.
 
     Raises ``InputError`` when the calibration's extensions are not in the form that a diagnosis writes.
     """
     effects = calibration.extensions.get("effects")
     if not effects:
-        return recording, ()
+        return _at_reference(calibration, recording), ()
     # Imported here: a linear calibration does not need it.
     from trihedron.diagnose import compensate
 
@@ -179,7 +177,8 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
         None if gyroscope is None else (gyroscope.S, gyroscope.b),
     )
     findings = tuple(_not_applied(effect_id, why) for effect_id, why in done.left_out.items())
-    return replace(recording, accelerometer=done.accelerometer, gyroscope=done.gyroscope), findings
+    linear = replace(recording, accelerometer=done.accelerometer, gyroscope=done.gyroscope)
+    return _at_reference(calibration, linear), findings
 
 
 def check_units(calibration: Calibration, recording: Recording) -> None:
@@ -261,39 +260,41 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
     )
 
 
-def thermally_corrected(
-    calibration: Calibration, recording: Recording
-) -> tuple[FloatArray | None, FloatArray | None] | None:
-    """Specific force and rate (n, 3) by S(T), b(T) of every sample; ``None`` where the calibration has no temperature
-    model or the log no temperature.
+def _at_reference(calibration: Calibration, recording: Recording) -> Recording:
+    """The raw readings at the reference temperature that S(T), b(T) of every sample make of them; the recording itself
+    where the calibration has no temperature model or the log no temperature.
 
     Outside the range S and b keep their values at its limits. Missing temperatures are interpolated.
     """
-    thermal = calibration.extensions.get("thermal")
     T = recording.temperature_degc
-    if not isinstance(thermal, Mapping) or T is None or not np.isfinite(T).any():
-        return None
+    if not isinstance(calibration.extensions.get("thermal"), Mapping) or T is None or not np.isfinite(T).any():
+        return recording
     low, high = (float(v) for v in calibration.extensions["valid_range"]["temperature_degc"])  # type: ignore[index]
     known = np.isfinite(T)
     whole = T if known.all() else np.interp(np.arange(len(T)), np.flatnonzero(known), T[known])
     knots = np.linspace(low, max(high, low + 1e-9), KNOTS)
     table = np.array([parameters_at(calibration, float(t)) for t in knots])
     place = (np.clip(whole, low, high) - low) / (knots[1] - knots[0])
-    return (
-        _followed(recording.accelerometer, table[:, :12], place),
-        _followed(recording.gyroscope, table[:, 12:], place) if table.shape[1] == 24 else None,
+    return replace(
+        recording,
+        accelerometer=_followed(recording.accelerometer, calibration.accelerometer, table[:, :12], place),
+        gyroscope=_followed(recording.gyroscope, calibration.gyroscope, table[:, 12:], place),
     )
 
 
-def _followed(readings: FloatArray | None, table: FloatArray, place: FloatArray) -> FloatArray | None:
-    if readings is None:
-        return None
+def _followed(
+    readings: FloatArray | None, sensor: SensorCalibration | None, table: FloatArray, place: FloatArray
+) -> FloatArray | None:
+    if readings is None or sensor is None:
+        return readings
+    of_reading = np.linalg.solve(sensor.S, table[:, :9].reshape(-1, 3, 3))
+    constant = np.linalg.solve(sensor.S, (table[:, 9:] - sensor.b).T).T
+    table = np.hstack([of_reading.reshape(-1, 9), constant])
     out = np.empty_like(readings)
     for start in range(0, len(readings), ROWS):
         rows = slice(start, start + ROWS)
         below = np.minimum(np.floor(place[rows]).astype(np.int64), len(table) - 2)
         share = (place[rows] - below)[:, None]
         parameters = (1.0 - share) * table[below] + share * table[below + 1]
-        S = parameters[:, :9].reshape(-1, 3, 3)
-        out[rows] = np.einsum("nij,nj->ni", S, readings[rows]) + parameters[:, 9:]
+        out[rows] = np.einsum("nij,nj->ni", parameters[:, :9].reshape(-1, 3, 3), readings[rows]) + parameters[:, 9:]
     return out

@@ -124,9 +124,9 @@ def _of_poses(
     findings = [*said, *recording.findings]
     if known is not None:
         check_units(known, recording)
-        recording, more = without_effects(known, recording)
+        linear, more = without_effects(known, recording)
         findings += more
-        segments = None if known.extensions.get("effects") else segments
+        recording, segments = linear, segments if linear is recording else None
     notify(0.02, "finding poses")
     segments = segments_of(segments, recording)
     findings += segments.findings

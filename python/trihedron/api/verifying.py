@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
+from trihedron.api.applying import (
+    AnyCalibration,
+    calibration_of,
+    check_range,
+    check_units,
+    doubted,
+    without_effects,
+)
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
@@ -24,7 +31,7 @@ from trihedron.records import Calibration, Finding, FindingCode, Recording, Segm
 from trihedron.records.progress import Progress
 from trihedron.records.ranking import Ranked, Ranking
 from trihedron.records.results import VerificationResult
-from trihedron.segment import resegment
+from trihedron.segment import averaged
 from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, mg_from_m_s2, rate_to_si
 
 
@@ -79,9 +86,8 @@ def verify(
     changed = [one for one in known.findings if one.code is FindingCode.BIAS_DRIFT]
     recording = recording_of(recording, latitude_deg)
     check_units(known, recording)
-    recording, more = without_effects(known, recording)
-    if known.extensions.get("effects"):
-        segments = None
+    linear, more = without_effects(known, recording)
+    recording, segments = linear, segments if linear is recording else None
     segments = segments_of(segments, recording, progress)
     gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m, gravity_of(known))
     own = own_calibration(recording, segments, gravity)
@@ -97,7 +103,7 @@ def verify(
         for found in judged.findings
     )
     findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
-    findings = (*doubted(known), *same_recording(known, recording), *changed, *findings)
+    findings = (*doubted(known), *same_recording(known, recording), *_range(known, recording), *changed, *findings)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 
 
@@ -123,6 +129,11 @@ def own_calibration(recording: Recording, segments: Segments, gravity_m_s2: floa
         return calibrate(recording, segments=segments, gravity_m_s2=gravity_m_s2).calibration
     except INPUT_ERRORS:
         return None
+
+
+def _range(known: Calibration, recording: Recording) -> Iterator[Finding]:
+    """Whether the log's temperature is one that the calibration is valid for: a warning, as the errors are measured."""
+    return (replace(found, severity=Severity.WARNING) for found in check_range(known, recording))
 
 
 def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | None) -> tuple[Finding, ...]:
@@ -248,13 +259,14 @@ def _judge(
     own: Calibration | None,
 ) -> Verification:
     check_units(known, recording)
-    recording, more = without_effects(known, recording)
-    if known.extensions.get("effects"):
-        # The same poses as those of the other calibrations, of the readings without the effects.
-        segments = resegment(recording, segments)
+    linear, more = without_effects(known, recording)
+    if linear is not recording:
+        # The same poses as those of the other calibrations, of the readings for which S and b are valid.
+        recording, segments = linear, averaged(linear, segments)
         known = with_bias_of_log(known, segments, gravity_m_s2)
+        own = own_calibration(recording, segments, gravity_m_s2)
     judged = verify_calibration(known, recording, segments, gravity_m_s2, source, own)
-    findings = (*recording.findings, *segments.findings, *judged.findings, *more)
+    findings = (*_range(known, recording), *recording.findings, *segments.findings, *judged.findings, *more)
     return replace(judged, findings=(*doubted(known), *same_recording(known, recording), *findings))
 
 

@@ -2,6 +2,6 @@
 
 from trihedron.segment.channels import BlockSums
 from trihedron.segment.recording import segment_blocks, segment_recording
-from trihedron.segment.resegmentation import resegment
+from trihedron.segment.resegmentation import averaged, resegment
 
-__all__ = ["BlockSums", "resegment", "segment_blocks", "segment_recording"]
+__all__ = ["BlockSums", "averaged", "resegment", "segment_blocks", "segment_recording"]

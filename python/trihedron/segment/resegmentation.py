@@ -35,7 +35,7 @@ def resegment(recording: Recording, segments: Segments) -> Segments:
     merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in drifting)]))
     if len(merged) == segments.n_poses and not drifting and not was_disturbed:
         return segments
-    return replace(_segments_of(recording, segments, merged), whole=_averaged_whole(recording, segments))
+    return replace(_segments_of(recording, segments, merged), whole=averaged(recording, segments))
 
 
 LONG_S = 1800.0
@@ -81,7 +81,7 @@ def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -
     return out
 
 
-def _averaged_whole(recording: Recording, segments: Segments) -> Segments:
+def averaged(recording: Recording, segments: Segments) -> Segments:
     """The poses as they were found, averaged over all of their samples, with the disturbances seen in them."""
     spans = [(pose.start, pose.stop, i) for i, pose in enumerate(segments.poses)]
     out = _segments_of(recording, segments, spans)
