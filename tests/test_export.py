@@ -276,7 +276,9 @@ def test_counts_are_refused_or_converted_by_the_size_of_a_count(target):
 
 def test_xio_scales_the_difference_then_aligns_to_g_and_degrees():
     known = calibration("counts")
-    said = re.finditer(r"(\w+) = \{([^}]*)\};", export_calibration(known, "xio"))
+    text = export_calibration(known, "xio")
+    assert "Readings in: counts, counts. Corrected in: g, deg/s." in text
+    said = re.finditer(r"(\w+) = \{([^}]*)\};", text)
     parts = {m[1]: np.array(numbers(m[2])) for m in said}
     wanted = (("accelerometer", known.accelerometer, 1 / 9.80665), ("gyroscope", known.gyroscope, 180 / np.pi))
     for name, sensor, unit in wanted:

@@ -264,6 +264,7 @@ def test_settings_of_inav_on_raw_counts_are_what_apply_gives(exact):
     known = given((S_a, -S_a @ zero), (S_g, -S_g @ [9.0, -11.0, -4.0]), 9.80665, "counts")
     sizes = ExportOptions(accel_lsb=f"{1000 / 2048!r} mg", gyro_lsb=f"{1 / 16.4!r} deg/s")
     text = export_calibration(known, "inav", sizes)
+    assert "Readings in: counts. Corrected in: counts." in text
     raw = np.random.default_rng(2).integers(-3000, 3000, (50, 3)).astype(float)
     # As INAV's acceleration.c and gyro.c correct, but for their rounding of the result.
     p = {w[1]: float(w[3]) for w in (line.split() for line in text.splitlines()) if w[:1] == ["set"] and w[3] != "OFF"}

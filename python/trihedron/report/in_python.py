@@ -37,7 +37,6 @@ _COMMANDS = {
     "trihedron allan --json": "trihedron.report(noise, path)",
     "trihedron allan": "trihedron.allan",
     "trihedron apply": "trihedron.apply",
-    "trihedron calibrate -o": "trihedron.write_calibration",
     "trihedron diagnose --json": "trihedron.report(diagnosis, path)",
     "trihedron diagnose": "trihedron.diagnose",
     "trihedron ports": "trihedron.ports()",
@@ -71,7 +70,7 @@ def _replacements() -> tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], st
         (re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'"), lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"'),
         (re.compile(r"--method (\w+)"), lambda m: f'method="{m[1]}"'),
         (re.compile(f"`({commands})`"), lambda m: f"`{_COMMANDS[m[1]]}`"),
-        (re.compile(rf"trihedron ({_VERBS})((?: (?:-o|--[\w-]+|[A-Z][A-Z_]*(?:\.json)?)(?![\w-]))+)"), _call),
+        (re.compile(rf"trihedron ({_VERBS})((?: (?:-o|--[\w-]+|\w+\.json|[A-Z][A-Z_]*)(?![\w-]))+)"), _call),
         (re.compile(rf"({flags})(?![\w-]){place}"), lambda m: _PARAMETERS[m[1]]),
     )
 

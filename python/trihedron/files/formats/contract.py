@@ -134,14 +134,17 @@ def _rescaled(sensor: SensorCalibration, unit: float) -> SensorCalibration:
     return replace(sensor, S=sensor.S / unit, covariance=covariance, raw_unit=sensor.si_unit)
 
 
-def heading(calibration: Calibration, equation: str, held: tuple[str, ...] = ()) -> list[str]:
-    """Comments at the head of a file: source, equation, units, trust, and effects it lacks, except those ``held``."""
+def heading(
+    calibration: Calibration, equation: str, held: tuple[str, ...] = (), corrected_in: str = "", read_in: str = ""
+) -> list[str]:
+    """Comments at the head of a file: source, equation, units (those of the calibration unless the target has its own),
+    trust, and effects it lacks, except those ``held``."""
     sensors = [sensor for _, sensor in calibration.sensors]
     rows = [
         f"Calibration of {calibration.recording_source or 'an unnamed recording'}, written by trihedron.",
         equation,
-        f"Readings in: {', '.join(sensor.raw_unit for sensor in sensors)}. "
-        f"Corrected in: {', '.join(sensor.si_unit for sensor in sensors)}.",
+        f"Readings in: {read_in or ', '.join(sensor.raw_unit for sensor in sensors)}. "
+        f"Corrected in: {corrected_in or ', '.join(sensor.si_unit for sensor in sensors)}.",
     ]
     if not calibration.is_trustworthy:
         rows.append("NOT TO BE TRUSTED: see the findings of the calibration.")

@@ -32,7 +32,8 @@ def to_inav(calibration: Calibration, options: ExportOptions) -> str:
             "raw counts (debug_mode = ACC), or say --current-parameters none where the readings were raw."
         )
     own, sensors = composed(calibration, options, "INAV", lambda _: AxisCorrection(np.zeros(3), np.ones(3), np.eye(3)))
-    lines = [f"# {line}" for line in heading(own, "corrected = (reading - acczero) * accgain / 4096, in counts.")]
+    equation = "corrected = (reading - acczero) * accgain / 4096; a gyro has gyro_zero only."
+    lines = [f"# {line}" for line in heading(own, equation, read_in="counts", corrected_in="counts")]
     lines += [f"# {line}" for line in lost_to_a_diagonal(own)]
     for name, sensor in own.sensors:
         count = _size_of_a_count(name, options)

@@ -15,8 +15,8 @@ _TO_SI = {"accelerometer": STANDARD_GRAVITY_M_S2, "gyroscope": 1.0 / degrees_fro
 
 def to_xio(calibration: Calibration, _options: ExportOptions) -> str:
     """Arrays in C for Fusion's functions."""
-    equation = "corrected = misalignment * (sensitivity o (raw - offset)): raw to g and deg/s, as Fusion expects."
-    lines = [f"// {line}" for line in heading(calibration, equation)]
+    equation = "corrected = misalignment * (sensitivity o (raw - offset)), in the units that Fusion expects."
+    lines = [f"// {line}" for line in heading(calibration, equation, corrected_in="g, deg/s")]
     for name, sensor in calibration.sensors:
         S = sensor.S / _TO_SI[name]
         scale = np.diag(S)
