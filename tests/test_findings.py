@@ -13,6 +13,7 @@ from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
 from trihedron.report.findings.wording import filled
+from trihedron.report.in_python import in_python
 
 PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
 
@@ -128,3 +129,12 @@ def test_the_documents_list_the_catalogue_as_it_is():
 )
 def test_a_place_in_a_sentence_takes_si_and_says_its_unit_its_number_and_its_branch(place, value, said):
     assert filled(place, {"x": value}, {}) == said
+
+
+def test_a_command_in_a_sentence_is_a_whole_call_in_python_or_stays_a_command():
+    texts = (text for entry in ENTRIES for text in (entry.seen, entry.cause, entry.action))
+    commands = {one for text in texts for one in re.findall(r"`trihedron [^`{}]*`", text)}
+    assert len(commands) > 5
+    for command in commands:
+        said = in_python(command)
+        assert said == command or ast.parse(said.strip("`"))

@@ -5,7 +5,7 @@ from typing import Literal
 
 from trihedron.records.finding import Finding
 from trihedron.records.plain import Plain
-from trihedron.records.presented import Presented
+from trihedron.records.presented import Printed
 
 Cause = Literal["static", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference"]
 CAUSES: tuple[Cause, ...] = ("static", "vibration", "bias", "temperature", "calibration", "g-sensitivity", "reference")
@@ -137,7 +137,7 @@ class IntervalCheck(Plain):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FilterNoise(Presented):
+class FilterNoise(Printed):
     """Filter noise of a log: its sensors, and without a reference the checks on its static intervals.
 
     ``static_source`` is the static log that was given; without one static values are of this log's own rest.

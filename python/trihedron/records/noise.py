@@ -13,7 +13,7 @@ from trihedron.errors import InputError
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode, Judged, Severity
 from trihedron.records.frozen import Frozen, freeze
-from trihedron.records.presented import Presented
+from trihedron.records.presented import Printed
 from trihedron.sanitise import one_line
 
 FEWEST_READINGS, LEAST_S = 512, 20.0
@@ -235,7 +235,7 @@ def _gauss_markov_allan(process: GaussMarkov, tau: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Noise(Presented):
+class Noise(Printed):
     """The noise of a log: its axes, the Allan curve, and problems of the log.
 
     Attributes

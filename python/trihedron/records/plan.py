@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from trihedron.records.presented import Presented
+from trihedron.records.presented import Printed
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class MovePlan:
 
 
 @dataclass(frozen=True)
-class ExperimentPlan(Presented):
+class ExperimentPlan(Printed):
     """Uncertainties to expect from known turns, poses and moves; noise densities in rad/s/√Hz and m/s²/√Hz."""
 
     gyroscope_density: float

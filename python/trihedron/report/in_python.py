@@ -13,7 +13,7 @@ _SAME = (
     "reference reference-columns serial static time-unit topic workers"
 )
 """Options whose parameters have the same name."""
-_VERBS = "allan|calibrate|check|diagnose|kalman|segment|verify"
+_VERBS = ("allan", "calibrate", "check", "diagnose", "kalman", "segment", "verify")
 """Commands whose arguments are those of the function of the same name."""
 _PARAMETERS = {f"--{name}": name.replace("-", "_") for name in _SAME.split()} | {
     "--accel-unit": "accelerometer_unit",
@@ -35,12 +35,9 @@ _PARAMETERS = {f"--{name}": name.replace("-", "_") for name in _SAME.split()} | 
 }
 _COMMANDS = {
     "trihedron allan --json": "trihedron.report(noise, path)",
-    "trihedron allan": "trihedron.allan",
     "trihedron apply": "trihedron.apply",
     "trihedron diagnose --json": "trihedron.report(diagnosis, path)",
-    "trihedron diagnose": "trihedron.diagnose",
     "trihedron ports": "trihedron.ports()",
-    "trihedron segment LOG": "trihedron.segment(recording)",
     "trihedron segment": "trihedron.segment(recording)",
 }
 _PLACES = {"LOG": "recording"}
@@ -57,50 +54,69 @@ Value = TypeVar("Value")
 
 @cache
 def _replacements() -> tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...]:
-    """Patterns of flags and commands with what replaces them; compiled on first use, as most commands need none."""
+    """Patterns of flags with what replaces them; compiled on first use, as most commands need none."""
     # A placeholder after a flag (`--latitude DEG`) is dropped: the parameter's name has the same meaning.
     place = r"(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|FILE|ALLAN\.json)\b)?"
-    flags, commands = (
-        "|".join(sorted(map(re.escape, words), key=len, reverse=True)) for words in (_PARAMETERS, _COMMANDS)
-    )
+    flags = "|".join(sorted(map(re.escape, _PARAMETERS), key=len, reverse=True))
     columns = r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?"
     return (
         (re.compile(columns), lambda m: f'columns="{m[1]}{m[2] or ""}"'),
         (re.compile(r"--turns (-?\d[\d,.-]*\d),\.\.\."), lambda m: f"turns_deg=[{m[1].replace(',', ', ')}, ...]"),
         (re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'"), lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"'),
         (re.compile(r"--method (\w+)"), lambda m: f'method="{m[1]}"'),
-        (re.compile(f"`({commands})`"), lambda m: f"`{_COMMANDS[m[1]]}`"),
-        (re.compile(rf"trihedron ({_VERBS})((?: (?:-o|--[\w-]+|\w+\.json|[A-Z][A-Z_]*)(?![\w-]))+)"), _call),
         (re.compile(rf"({flags})(?![\w-]){place}"), lambda m: _PARAMETERS[m[1]]),
     )
 
 
-def _call(command: re.Match[str]) -> str:
-    """``trihedron diagnose LOG --reference MOTION`` as ``trihedron.diagnose(recording, reference=motion)``."""
-    given, around, flag = [], [], ""
-    for word in command[2].split():
-        value = _PLACES.get(word, word.lower())
+_COMMAND = re.compile(r"`(trihedron \w+[^`]*)`")
+
+
+def _call(command: str) -> str:
+    """``trihedron diagnose LOG --reference MOTION`` as ``trihedron.diagnose(recording, reference=motion)``; a command
+    that is no call of one function with parameters of these names stays one for the command line."""
+    if command in _COMMANDS:
+        return _COMMANDS[command]
+    verb, *words = command.split()[1:]
+    if verb not in _VERBS:
+        return command
+    if not words:
+        return f"trihedron.{verb}"
+    given, around = [], []
+    while words:
+        word = words.pop(0)
+        value = words.pop(0) if word.startswith("-") and words and not words[0].startswith("-") else ""
         if word in _AROUND:
             around.append(_AROUND[word])
-        elif word.startswith("-"):
-            given.append(f"{_PARAMETERS.get(word, word.lstrip('-').replace('-', '_'))}=True")
-        elif not flag:
-            given.append(value)
-        elif flag not in _AROUND:
-            given[-1] = given[-1].replace("True", value)
-        flag = word if word.startswith("-") else ""
-    call = f"trihedron.{command[1]}({', '.join(given)})"
+        elif word == "--force" and around:
+            around[-1] = around[-1].replace("path)", f"path, {_PARAMETERS[word]})")
+        elif word in _PARAMETERS or word == "--method":
+            given.append(f"{_PARAMETERS.get(word, 'method')}={_value(value) if value else True}")
+        elif word.isupper() and (not given or verb == "verify"):
+            given.append(_value(word))
+        else:
+            return command
+    call = f"trihedron.{verb}({', '.join(given)})"
     for outer in around:
         call = outer.format(call)
     return call
 
 
+def _value(word: str) -> str:
+    """A place (``LOG``) as a variable, a number as it is, any other word as text."""
+    if word.isupper():
+        return _PLACES.get(word, word.lower())
+    return word if re.fullmatch(r"-?[\d.]+", word) else f'"{word}"'
+
+
 def in_python(text: str) -> str:
-    """A sentence with ``--columns ax=1`` as ``columns="ax=1"`` and other flags as their parameters."""
-    if "--" in text or "`trihedron " in text:
-        for pattern, replaced in _replacements():
-            text = pattern.sub(replaced, text)
-    return text
+    """A sentence with ``--columns ax=1`` as ``columns="ax=1"``, other flags as their parameters, commands as calls."""
+    if "--" not in text and "`trihedron " not in text:
+        return text
+    parts = _COMMAND.split(text)
+    parts[1::2] = [f"`{_call(command)}`" for command in parts[1::2]]
+    for pattern, replaced in _replacements():
+        parts[::2] = [pattern.sub(replaced, part) for part in parts[::2]]
+    return "".join(parts)
 
 
 def result_in_python(result: Value) -> Value:
