@@ -76,6 +76,18 @@ def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
     assert axis.gauss_markov.sigma_process == pytest.approx(5e-3, rel=0.25)
 
 
+def test_intervals_beside_a_strong_process_hold_whatever_its_correlation_time():
+    rng = np.random.default_rng(31)
+    x = np.stack([with_process(rng, 1 << 16, 200.0, 0.05, 1e-2, 1e-3) for _ in range(6)], axis=1)
+    axes = identify_noise(x, 200.0).axes
+    # A log determines the time to 5 %: in steps of 9 % all would have one of two or three times.
+    assert len({axis.gauss_markov.correlation_time_s for axis in axes}) > 3
+    white, process = [axis.terms[TermName.WHITE] for axis in axes], [axis.gauss_markov for axis in axes]
+    # Five of six, at 95 % each, with a probability of 0.97 in either.
+    assert sum(term.lower <= 1e-3 <= term.upper for term in white) >= 5
+    assert sum(one.lower <= 1e-2 <= one.upper for one in process) >= 5
+
+
 def test_a_gauss_markov_process_beside_a_warm_up_is_named_and_its_interval_holds():
     rng, inside, named = np.random.default_rng(27), 0, 0
     t = np.arange(36_000) / 10.0

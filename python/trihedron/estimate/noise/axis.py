@@ -1,7 +1,7 @@
 """Noise terms of one axis: spectrum, low-pass filtering, lines, model, intervals."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -60,14 +60,14 @@ RAMP_TAIL = 0.0025
 _QUANTISATION, _WHITE, _FLICKER, _WALK = range(len(SYMBOLS))
 
 
-def terms_of(found: _core.SpectralInversion, pair: SlowPair) -> dict[TermName, NoiseTerm]:
-    """Values and intervals of Q, N, B, K and R from the inverted likelihood."""
+def terms_of(found: _core.SpectralInversion, pair: SlowPair, rise: float = 0.0) -> dict[TermName, NoiseTerm]:
+    """Values and intervals of Q, N, B, K and R from the inverted likelihood of a model ``rise`` above the likeliest."""
     strength = found.strength if pair.is_present else found.strength_without_pair
     out = {}
     for k, symbol in enumerate(SYMBOLS):
         # Median of B and K: the most likely value of one is 0 where the other explains the slow noise.
         estimate = found.median[k] if k in (_FLICKER, _WALK) else found.most_likely[k]
-        is_present = found.rise_without[k] > NAMED
+        is_present = found.rise_without[k] + rise > NAMED
         out[TermName(symbol)] = NoiseTerm(
             symbol=TermName(symbol),
             is_present=is_present,
@@ -76,7 +76,7 @@ def terms_of(found: _core.SpectralInversion, pair: SlowPair) -> dict[TermName, N
             lower=found.lower[k],
             upper=found.upper[k],
             limit=found.upper[k],
-            evidence=found.rise_without[k],
+            evidence=found.rise_without[k] + rise,
             estimate=estimate,
             fitted=math.sqrt(strength[k]),
         )
@@ -112,8 +112,8 @@ def gauss_markov_of(found: _core.SpectralInversion, model: Model) -> GaussMarkov
         sigma_process=found.most_likely[k],
         correlation_time_s=model.correlation_time_s,
         sigma=found.spread[k],
-        lower=min(found.lower[k], model.reach[0]),
-        upper=max(found.upper[k], model.reach[1]),
+        lower=found.lower[k],
+        upper=found.upper[k],
         evidence=model.evidence,
     )
 
@@ -167,17 +167,28 @@ def identify_axis(
     )
 
     def stated(model: Model) -> NoiseAxis:
-        return _stated(model, blank, tails, is_filtered=highest < nyquist)
+        one, *others = (_stated(each, blank, tails, is_filtered=highest < nyquist) for each in (model, *model.beside))
+        return _over(one, others)
 
     axis, *others = map(stated, likely)
     # Beside changes that are only plausible no other process is, but one that is stated is kept where it may be.
     beside = [stated(models(bands)[0 if axis.gauss_markov is None else -1]) for bands in choices[1:]]
-    for other in (*others, *beside):
-        terms = {name: _either(term, other.terms[name]) for name, term in axis.terms.items()}
-        axis = replace(axis, terms=MappingProxyType(terms))
+    axis = _over(axis, (*others, *beside))
     for other in beside:
         axis = replace(axis, slow_pair=min(axis.slow_pair, other.slow_pair, key=lambda pair: pair.evidence))
     return replace(axis, findings=(*axis.findings, *remarks.about_terms(axis, range_degc)))
+
+
+def _over(axis: NoiseAxis, others: Iterable[NoiseAxis]) -> NoiseAxis:
+    """The axis with intervals that reach over those of other models of it."""
+    for other in others:
+        terms = {name: _either(term, other.terms[name]) for name, term in axis.terms.items()}
+        process, another = axis.gauss_markov, other.gauss_markov
+        if process is not None and another is not None:
+            ends = {"lower": min(process.lower, another.lower), "upper": max(process.upper, another.upper)}
+            process = replace(process, sigma=max(process.sigma, another.sigma), **ends)
+        axis = replace(axis, terms=MappingProxyType(terms), gauss_markov=process)
+    return axis
 
 
 def _either(one: NoiseTerm, other: NoiseTerm) -> NoiseTerm:
@@ -199,10 +210,12 @@ def _stated(model: Model, blank: NoiseAxis, tails: float, *, is_filtered: bool) 
     """``blank`` with the terms of one model."""
     model, bend = straightened(model) if is_filtered else (model, 0.0)
     model, scale, worst = _tempered(model)
-    found = model.spectrum.likelihood.invert(RISE, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
-    alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK])
-    pair = SlowPair(found.rise_without_pair, found.rise_without_pair > PAIR_NAMED or alone > NAMED)
-    terms = terms_of(found, pair)
+    # The profile over correlation times: each is as much less likely in itself as its interval is narrower.
+    found = model.spectrum.likelihood.invert(RISE - model.rise, (_FLICKER, _WALK), _WALK, RAMP_OUTSIDE)
+    alone = max(found.rise_without[_FLICKER], found.rise_without[_WALK]) + model.rise
+    of_pair = found.rise_without_pair + model.rise
+    pair = SlowPair(of_pair, of_pair > PAIR_NAMED or alone > NAMED)
+    terms = terms_of(found, pair, model.rise)
     white = terms[TermName.WHITE]
     terms[TermName.WHITE] = widened(white, math.hypot(bend, tails) * white.estimate)
     findings = blank.findings

@@ -113,14 +113,15 @@ def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolA
 class Model:
     """A spectrum with its terms and, perhaps, a Gauss-Markov process as the last.
 
-    ``evidence`` is what the process reduces the deviance by beyond the slow terms that it replaces, ``reach`` the
-    interval of its standard deviation over all its likely correlation times.
+    ``evidence`` is what the process reduces the deviance by beyond the slow terms that it replaces; ``beside`` are the
+    other likely correlation times, each with the ``rise`` of the deviance above that of the most likely one.
     """
 
     spectrum: BinnedSpectrum
     correlation_time_s: float | None = None
     evidence: float = 0.0
-    reach: tuple[float, float] = (0.0, 0.0)
+    rise: float = 0.0
+    beside: tuple[Model, ...] = ()
 
     def power(self, band: Ordinates, step_s: float) -> FloatArray:
         """(k,) expected power of every ordinate of ``band``; readings are ``step_s`` apart."""
@@ -195,12 +196,32 @@ def _models(step_s: float, spectrum: BinnedSpectrum) -> list[Model]:
     if coarse.max() < EVIDENCE:
         return [without]
     best, step = grid[coarse.argmax()], grid[1] / grid[0]
-    times = np.geomspace(max(best / step, grid[0]), best * step, 17)
+    times = np.geomspace(max(best / step, grid[0]), best * step, N_TIMES)
     gain, likely = gains(times, (EVIDENCE, PLAUSIBLE))
-    most, k = float(gain.max()), int(gain.argmax())
+    most = float(gain.max())
     if most < 2.0 * EVIDENCE and likely.max() < 2.0 * PLAUSIBLE:
         return [without]
-    at = [spectrum.with_gauss_markov(step_s, time_s) for time_s in times]
-    sizes = [np.sqrt(one.fit.strength[-1]) for one, own in zip(at, gain, strict=True) if own > most - RISE]
-    process = Model(at[k], float(times[k]), most, (min(sizes), max(sizes)))
+    process = replace(_at_likely_times(spectrum, step_s, times), evidence=most)
     return [process] if most >= 2.0 * EVIDENCE else [without, process]
+
+
+N_TIMES = 17
+"""Correlation times tried at once."""
+LEAST_TIMES = 5
+"""Fewest of them that are to be likely: intervals reach over these."""
+
+
+def _at_likely_times(spectrum: BinnedSpectrum, step_s: float, times: FloatArray) -> Model:
+    """The spectrum with a process at the most likely of ``times`` (or between them), and at the other likely ones."""
+    while True:
+        at = [spectrum.with_gauss_markov(step_s, time_s) for time_s in times]
+        deviance = np.array([one.fit.deviance for one in at])
+        k = int(deviance.argmin())
+        rise = deviance - deviance[k]
+        likely = np.flatnonzero(rise < RISE)
+        if len(likely) >= LEAST_TIMES or times[-1] < 1.001 * times[0]:
+            break
+        times = np.geomspace(times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)], N_TIMES)
+    tried = likely[np.unique(np.linspace(0, len(likely) - 1, LEAST_TIMES).round().astype(int))]
+    beside = tuple(Model(at[i], float(times[i]), rise=float(rise[i])) for i in tried if i != k)
+    return Model(at[k], float(times[k]), beside=beside)
