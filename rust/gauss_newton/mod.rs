@@ -211,6 +211,10 @@ pub fn descend<D: Descent>(
     }
 }
 
+/// Share of the cost below which a change of it is rounding: a residual of the size of its standard error is the
+/// difference of quantities that are 1e5 times as large, to sixteen digits. The Newton step is then taken as it is.
+const FLAT: f64 = 1e-10;
+
 /// A step that lowers the cost, undamped when possible; `None` when even a tiny one does not.
 fn lower<D: Descent>(
     problem: &D,
@@ -219,6 +223,12 @@ fn lower<D: Descent>(
     undamped: DVector<f64>,
     damping: &mut f64,
 ) -> Result<Option<D::Point>> {
+    if local.predicted(&undamped) <= FLAT * local.cost() {
+        let moved = problem.moved(point, &undamped);
+        if (problem.cost(&moved)? - local.cost()).abs() <= FLAT * local.cost() {
+            return Ok(Some(moved));
+        }
+    }
     let mut known = Some(undamped);
     for _ in 0..60 {
         let delta = match known.take() {
@@ -235,13 +245,6 @@ fn lower<D: Descent>(
             } else if gain < 0.25 {
                 *damping = (*damping * 4.0).max(1e-4);
             }
-            return Ok(Some(moved));
-        }
-        // Flat to rounding: the change is below what the sum of squares can resolve, so take the Newton step as it is.
-        if *damping == 0.0
-            && predicted <= 1e-13 * local.cost()
-            && (cost - local.cost()).abs() <= 1e-12 * local.cost()
-        {
             return Ok(Some(moved));
         }
         *damping = (*damping * 8.0).max(1e-4);
