@@ -56,7 +56,7 @@ Value = TypeVar("Value")
 def _replacements() -> tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...]:
     """Patterns of flags with what replaces them; compiled on first use, as most commands need none."""
     # A placeholder after a flag (`--latitude DEG`) is dropped: the parameter's name has the same meaning.
-    place = r"(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|FILE|ALLAN\.json)\b)?"
+    place = r"(?: [A-Z][A-Z_0-9]*(?:\.json)?(?![\w-]))?"
     flags = "|".join(sorted(map(re.escape, _PARAMETERS), key=len, reverse=True))
     columns = r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?"
     return (
