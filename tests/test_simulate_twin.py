@@ -7,6 +7,7 @@ import pytest
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read, segment
+from trihedron.api.simulating import twin
 from trihedron.channel_facts.limits import find_limits
 from trihedron.records.channel_facts import ChannelFacts
 from trihedron.sensor_model import correct
@@ -95,6 +96,9 @@ def test_the_twin_of_a_simulation_has_its_noise_and_poses():
         # A pose mean is known to N/√t = 2e-3 m/s² per axis, and b and S with it.
         assert np.linalg.norm(pair[0] - pair[1]) < 0.02
     assert copy.n_samples == recording.n_samples
+    in_g = replace(calibration, accelerometer=replace(calibration.accelerometer, raw_unit="g"))
+    with pytest.raises(ValueError, match="this calibration maps g"):
+        twin(recording, in_g)
 
 
 def test_motion_near_half_the_sampling_rate_is_repeated():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from trihedron.api.applying import AnyCalibration, calibration_of
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units
 from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.records import Recording, Truth
@@ -87,7 +87,7 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
     Raises
     ------
     ValueError
-        When the recording has no poses, or lacks a sensor.
+        When units differ, the recording has no poses, or it lacks a sensor.
 
     Examples
     --------
@@ -96,4 +96,5 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
     True
     """
     recording, known = recording_of(recording), calibration_of(calibration)
+    check_units(known, recording)
     return run(twin_scenario(recording, segment_recording(recording), known), seed)
