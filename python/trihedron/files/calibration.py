@@ -90,7 +90,7 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     'rad/s'
     """
     path = Path(path)
-    meant = "name a calibration file (`trihedron calibrate LOG -o calibration.json`), before the log"
+    meant = "name a calibration file (`trihedron calibrate LOG -o calibration.json`); it comes before the log"
     document = read_json(path, "calibration file", meant, CalibrationFileError)
     return calibration_from_document(document, str(path))
 
@@ -142,7 +142,7 @@ def calibration_from_document(document: object, source: str = "document") -> Cal
     """
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise CalibrationFileError(
-            f"{source}: this JSON is no calibration file; `trihedron calibrate LOG -o calibration.json` writes one."
+            f"{source}: this JSON is not a calibration; `trihedron calibrate LOG -o calibration.json` writes one."
         )
     stated = document.get("format_version")
     if isinstance(stated, int) and stated > FORMAT_VERSION:
