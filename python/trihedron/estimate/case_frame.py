@@ -27,8 +27,11 @@ ROUNDS, SETTLED = 500, 1e-3
 """Most steps of that search (expectation maximisation), and the relative change of all sizes at which it ends."""
 LEAST_RAD = 1e-7
 """Least error of a component: logs of simulations without noise, and errors that all readings of an axis share."""
-TABLE, TURN = "table", "turn"
-"""Names of the leans of a table and of what differs from turn to turn; those of faces have their number."""
+TABLE, HEADING, TURN = "table", "heading", "turn"
+"""Names of the leans of a table, of what differs from heading to heading on it and from turn to turn; those of faces
+have their number."""
+OF_TABLE = (TABLE, HEADING)
+"""Leans of any size; others have the prior of faces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +93,12 @@ def fit_case(
     Poses that contradict each other beyond their noise and the lean of faces were on a table that leans; the sizes of
     leans are those of the largest restricted likelihood with their priors.
     """
-    known = {name: FLAT_RAD for name in poses.leans if name != TABLE}
+    known = {name: FLAT_RAD for name in poses.leans if name not in OF_TABLE}
     level = _solved(values, covariance, free, poses, known)
     is_level = level.dof <= 0 or level.chi2 <= chdtri(level.dof, SIGNIFICANCE)
     rows = poses if turns is None else poses.beside(turns)
-    sizes = {name: LEAN_RAD if name == TABLE else FLAT_RAD for name in rows.leans if not (name == TABLE and is_level)}
+    of_table = {} if is_level else {name: LEAN_RAD for name in rows.leans if name in OF_TABLE}
+    sizes = {name: FLAT_RAD for name in rows.leans if name not in OF_TABLE} | of_table
     fit = _solved(values, covariance, free, rows, sizes)
     for _ in range(ROUNDS if sizes else 0):
         last, sizes = sizes, {name: _size(fit, rows.leans[name], name) for name in sizes}
@@ -106,7 +110,7 @@ def fit_case(
 
 def _size(fit: CaseFit, columns: FloatArray, name: str) -> float:
     """Size of leans after one step of expectation maximisation, from their posterior mean squares."""
-    before, dof = fit.sizes[name] ** 2, 0.0 if name == TABLE else FLAT_DOF
+    before, dof = fit.sizes[name] ** 2, 0.0 if name in OF_TABLE else FLAT_DOF
     through = columns.T @ fit.projection
     squares = np.sum((before * through @ fit.misfit) ** 2) + before * columns.shape[1]
     squares -= before**2 * np.sum(through * columns.T)

@@ -1,5 +1,6 @@
 """Method 1: the faces of the case on a table (docs/model.md, section 2)."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -7,11 +8,20 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import probability
-from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray, rms_of
 from trihedron.estimate.accelerometer import face_poses, verdict
 from trihedron.estimate.accelerometer.face_poses import direction_of
 from trihedron.estimate.accelerometer.norm import checked_gravity, norm_residual, pose_means
-from trihedron.estimate.case_frame import TABLE, CaseFit, CaseRows, OnFaces, across_faces, fit_case, spread_over
+from trihedron.estimate.case_frame import (
+    HEADING,
+    TABLE,
+    CaseFit,
+    CaseRows,
+    OnFaces,
+    across_faces,
+    fit_case,
+    spread_over,
+)
 from trihedron.records import Finding, FindingCode, FitQuality, Observability, SensorCalibration, Severity
 from trihedron.records.words import words
 from trihedron.units import AccelerationUnit, degrees_from_radians
@@ -76,7 +86,7 @@ def calibrate_faces(
     # Readings about their mean: counts around 32768 would cost the normal equations ten digits.
     S, moved = fit.values[:9].reshape(3, 3), np.eye(12)
     moved[9:, :9] = -np.kron(np.eye(3), origin)
-    b, lean = fit.values[9:] - S @ origin, fit.sizes.get(TABLE, 0.0)
+    b, lean = fit.values[9:] - S @ origin, math.hypot(fit.sizes.get(TABLE, 0.0), fit.sizes.get(HEADING, 0.0))
     residual = seen.values @ S.T + fit.values[9:] - g * direction_of(seen.faces)
     apart = np.full((len(values), 2), np.nan)
     error, covariance = fit.left_out(np.arange(3 * n).reshape(n, 3))
@@ -124,7 +134,12 @@ def _rows(seen: OnFaces, S: FloatArray, shared: FloatArray | None) -> CaseRows:
                 blocks = slice(3 * i, 3 * i + 3), slice(3 * k, 3 * k + 3)
                 of = (S[axes[i]][:, axes[i]] * (ALIKE * both * shared[axes[i]])) @ S[axes[i]][:, axes[i]].T
                 rows.noise[blocks] += of / seen.sizes[0] ** 2
-    return replace(rows, leans={TABLE: spread_over(across_only, owner)})
+    # The case is often set down again as before, and leans as before.
+    face = np.unique(seen.faces, return_inverse=True)[1].ravel()
+    leans = {TABLE: spread_over(across_only, face)}
+    if owner.max() > face.max():
+        leans[HEADING] = spread_over(across_only, owner)
+    return replace(rows, leans=leans)
 
 
 def _with_doubt(fit: CaseFit, rows: CaseRows, lean: float, g: float) -> FloatArray:
@@ -136,22 +151,26 @@ def _with_doubt(fit: CaseFit, rows: CaseRows, lean: float, g: float) -> FloatArr
     """
     if lean == 0.0:
         return fit.covariance
-    n_headings = rows.leans[TABLE].shape[1] // 2
-    out = fit.covariance * widened(fit.dof, n_headings) ** 2
+    n_faces, n_headings = (rows.leans.get(name, rows.leans[TABLE]).shape[1] // 2 for name in (TABLE, HEADING))
+    # A face leans by the mean over its headings.
+    of_headings = fit.sizes.get(HEADING, 0.0) ** 2 * n_faces / n_headings
+    of_table = fit.sizes[TABLE] ** 2, min(fit.dof, n_faces - FREE_HEADINGS)
+    out = fit.covariance * widened(of_table, (of_headings, n_headings - n_faces)) ** 2
     out += np.outer(fit.values, fit.values) * lean**4
     out[9:, 9:] += (g * lean**2) ** 2 * np.eye(3)
     return out
 
 
-def widened(dof: int, n_headings: int) -> float:
-    """Factor on standard uncertainties from a lean with few degrees of freedom, so that 1.96 of them cover 95 %.
+def widened(*leans: tuple[float, int]) -> float:
+    """Factor on standard uncertainties from leans, a variance and its degrees of freedom each, so that 1.96 of them
+    cover 95 %: those of their sum are Welch and Satterthwaite's.
 
-    Where the leans of headings are independent, their contradictions have ``dof`` degrees of freedom. One leaning
-    table with the case at arbitrary headings is harder to detect: equal leans cancel at some headings. The probability
-    that the contradictions are below a fraction s of the lean falls only as s^(n - 3).
+    One leaning table with the case at arbitrary headings is harder to detect than independent leans: equal leans cancel
+    at some headings. The probability that the contradictions of n faces are below a fraction s of the lean falls only
+    as s^(n - 3).
     """
-    free = max(min(dof, n_headings - FREE_HEADINGS), 1)
-    return float(probability.stdtrit(free, 0.025) / probability.ndtri(0.025))
+    free = sum(v for v, _ in leans) ** 2 / max(sum(v**2 / max(dof, 1) for v, dof in leans), TINY)
+    return float(probability.stdtrit(max(free, 1.0), 0.025) / probability.ndtri(0.025))
 
 
 def _quality(
