@@ -33,6 +33,8 @@ SQUARE = 0.05
 """Standard error of an angle between axes of a triad and of the case that are not measured."""
 ALIKE = 0.9
 """Part of the rounding variance of equal readings that is the same error: some are nearer to the edge of a code."""
+N_DETERMINING = 4
+"""Number of faces that determine S and b: no more of them contradict no lean that they have in common."""
 FREE_HEADINGS = 3
 """Number of headings that stay free when faces on one tilted table do not contradict each other at all: the heading of
 each opposite face is such that its tilt cancels."""
@@ -134,11 +136,11 @@ def _rows(seen: OnFaces, S: FloatArray, shared: FloatArray | None) -> CaseRows:
                 blocks = slice(3 * i, 3 * i + 3), slice(3 * k, 3 * k + 3)
                 of = (S[axes[i]][:, axes[i]] * (ALIKE * both * shared[axes[i]])) @ S[axes[i]][:, axes[i]].T
                 rows.noise[blocks] += of / seen.sizes[0] ** 2
-    # The case is often set down again as before, and leans as before.
+    leans = {TABLE: spread_over(across_only, owner)}
     face = np.unique(seen.faces, return_inverse=True)[1].ravel()
-    leans = {TABLE: spread_over(across_only, face)}
-    if owner.max() > face.max():
-        leans[HEADING] = spread_over(across_only, owner)
+    if owner.max() > face.max() >= N_DETERMINING:
+        # The case is often set down again as before, and leans as before.
+        leans = {TABLE: spread_over(across_only, face), HEADING: leans[TABLE]}
     return replace(rows, leans=leans)
 
 
