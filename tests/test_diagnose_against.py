@@ -13,7 +13,7 @@ from small_session import SCENARIO, G, made_once, rejected
 from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
 from trihedron.comparison.model import _with_shared_effects
-from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
+from trihedron.diagnose.against.fitted import FittedModel, FittedSensor, model_of_diagnosis
 from trihedron.diagnose.against.mechanisms import compare_effects
 from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
@@ -70,19 +70,24 @@ def test_a_row_that_the_recordings_best_shape_lacks_is_zero_there():
     assert compare_effects([given], found, alpha=0.01).surplus
 
 
-def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
+def test_pushed_poses_faint_lines_and_the_arm_beside_a_calibration_are_no_physics_that_a_model_lacks():
     def effect(effect_id, share):
         size = EffectParameter("size", 0.01, 3e-4, "m/s^2")
         return AcceptedEffect(effect_id, "", (size,), 0.0, 99.0, (), share=share)
 
-    def differ(given, *effects, tried=()):
+    def differ(given, *effects, tried=(), has_motion=True):
         found = SimpleNamespace(effects=effects, candidates=tried, domains=(), remaining=())
-        return compare_effects(given, found, alpha=0.01).differ
+        return compare_effects(given, found, alpha=0.01, has_motion=has_motion).differ
 
     pushed, faint = effect("disturbed-pose", 0.7), effect("periodic-interference", 0.05)
     assert not differ([], pushed, faint)
     assert differ([], pushed, effect("periodic-interference", 0.25))
     assert differ([], pushed, effect("accel-cubic", 0.9))
+    # A calibration states no motion whose arm could be another one.
+    arm = effect("lever-arm", 0.9)
+    assert differ([], arm)
+    assert not differ([], arm, has_motion=False)
+    assert differ([], arm, effect("accel-cubic", 0.1), has_motion=False)
     # What only the model has is no footnote of the recording.
     assert differ([faint], tried=[Candidate("periodic-interference", 0.4, True)])
 
@@ -171,6 +176,18 @@ def test_residuals_under_effects_that_both_have_keep_the_names_of_their_rows():
     (row,) = _with_shared_effects(replace(found, residuals=(fewer,))).residuals
     assert row.names_before == row.names_after
     assert len(row.names_before) == len(row.before)
+
+
+def test_misfit_that_stays_unexplained_widens_the_uncertainty_of_its_own_sensor():
+    found = diagnosed("", 3, 12)
+    moves = next(test for test in found.remaining if test.domain == "moves")
+    left = [replace(test, chi2_per_dof=9.0, disagrees=True) if test is moves else test for test in found.remaining]
+    widened = replace(found, remaining=tuple(left))
+    before, after = (np.sqrt(np.diag(model_of_diagnosis(one).covariance)) for one in (found, widened))
+    of_gyro = np.repeat([False, True], 12)
+    # Rounding alone: the widened covariance is the same one times 9.
+    assert after[~of_gyro] == pytest.approx(before[~of_gyro], rel=1e-12)
+    assert after[of_gyro] == pytest.approx(3.0 * before[of_gyro], rel=1e-12)
 
 
 def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():

@@ -108,7 +108,8 @@ def compared(
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
     given_effects = () if simulated is None else _without_walk(simulated[0].effects, noise)
     tried_on_model = () if simulated is None else simulated[0].candidates
-    effects = compare_effects(given_effects, found, alpha=alpha, tried_on_model=tried_on_model)
+    has_motion = simulated is not None
+    effects = compare_effects(given_effects, found, alpha=alpha, tried_on_model=tried_on_model, has_motion=has_motion)
     numbers = compare_numbers(
         model,
         own,

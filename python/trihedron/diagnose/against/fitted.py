@@ -13,6 +13,7 @@ from trihedron.errors import InputError
 from trihedron.invariants import invariants, jacobian
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.domains import Domain
 from trihedron.session.noise import between_sessions
 from trihedron.units import si_of
 
@@ -44,6 +45,12 @@ def _scaled(given: SensorCalibration, own: FittedSensor) -> SensorCalibration:
 LONGEST_CORNER = 0.25
 """Share of the recording above which a corner time is not distinguished from none: the bias may walk by as much. In 14
 simulated pairs of one unit accelerometer differences are 0.9 to 1.1 of their uncertainty."""
+
+OWN_DOMAINS: tuple[frozenset[Domain], frozenset[Domain]] = (
+    frozenset({"static-accel"}),
+    frozenset({"static-gyro", "moves"}),
+)
+"""Domains that determine S and b of the accelerometer and of the gyro."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +98,14 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     """The fit of a recording, with its accepted effects or without.
 
     Bias change between two sessions: twice the floor of the Allan variance, or what the biases of the poses show
-    where that is more (eq. 9.2, 9.3).
+    where that is more (eq. 9.2, 9.3). Misfit of a sensor's own domains that stays unexplained is no noise that the fit
+    averages out: the sensor's covariance is multiplied by it (Birge's ratio).
     """
     fit = diagnosis.extended if with_effects else diagnosis.baseline
     if fit.covariance is None:
         raise InputError("a diagnosis is compared by its covariance, and this one carries none")
-    covariance = np.array(fit.covariance)
+    scale = np.repeat([_unexplained(diagnosis, domains) for domains in OWN_DOMAINS], 12)[: len(fit.covariance)]
+    covariance = np.array(fit.covariance) * np.sqrt(np.outer(scale, scale))
     of_gyro = np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis))
     accelerometer, gyroscope = (
         None if side is None else FittedSensor(np.array(side["S"]), np.array(side["b"]), str(side["raw_unit"]), drift)
@@ -104,6 +113,13 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     )
     assert accelerometer is not None
     return FittedModel(accelerometer, gyroscope, covariance)
+
+
+def _unexplained(diagnosis: Diagnosis, domains: frozenset[Domain]) -> float:
+    """Largest χ² per degree of freedom of ``domains`` that disagree after the effects; at least 1."""
+    return max(
+        (test.chi2_per_dof for test in diagnosis.remaining if test.disagrees and test.domain in domains), default=1.0
+    )
 
 
 def _floor(diagnosis: Diagnosis, sensor: str) -> FloatArray:

@@ -76,16 +76,15 @@ def _moved(parameter: EffectParameter, number: str, unit: str, span_k: float | N
 
 @dataclass(frozen=True)
 class ComparedEffects:
-    """``missing`` from the model, ``surplus`` in it, and the parameters of those that both have."""
+    """``missing`` from the model, ``surplus`` in it, and the parameters of those that both have.
+
+    ``differ``: whether the two differ in more than minor effects.
+    """
 
     missing: tuple[AcceptedEffect, ...]
     surplus: tuple[AcceptedEffect, ...]
     parameters: tuple[ParameterDifference, ...]
-
-    @property
-    def differ(self) -> bool:
-        """Whether the instruments differ; minor effects do not count."""
-        return bool(self.surplus) or not all(is_footnote(effect) for effect in self.missing)
+    differ: bool
 
     @property
     def in_order(self) -> tuple[AcceptedEffect, ...]:
@@ -94,12 +93,18 @@ class ComparedEffects:
 
 
 def compare_effects(
-    model: Sequence[AcceptedEffect], found: Diagnosis, *, alpha: float, tried_on_model: Sequence[Candidate] = ()
+    model: Sequence[AcceptedEffect],
+    found: Diagnosis,
+    *,
+    alpha: float,
+    tried_on_model: Sequence[Candidate] = (),
+    has_motion: bool = True,
 ) -> ComparedEffects:
     """Pair the effects of a model with those ``found`` in a recording, by id or by what was confounded with them.
 
     An effect of one side alone is missing or surplus where the other side's own estimate of it excludes its size;
-    ``tried_on_model`` are the candidates of the simulation's own diagnosis. What a recording cannot show is not surplus
+    ``tried_on_model`` are the candidates of the simulation's own diagnosis. A model without motion (a calibration) has
+    no arm that could be another one. What a recording cannot show is not surplus
     there, unless it would be seen as a drift; nor is an effect of one session (a disturbed pose, a table that was not
     level, the arm to the centre of rotation), nor one that shows in a domain in which the recording has unexplained
     misfit: it may be hidden there.
@@ -128,18 +133,20 @@ def compare_effects(
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
     ]
     parameters = [p for m, r in alike for p in _parameters(m.id, m.parameters, r.parameters, alpha)]
-    return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
+    differ = bool(surplus) or not all(is_footnote(effect, has_motion) for effect in missing)
+    return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters), differ)
 
 
-def is_footnote(effect: AcceptedEffect) -> bool:
-    """Whether an effect of the recording is not counted as missing from its simulation.
+def is_footnote(effect: AcceptedEffect, has_motion: bool) -> bool:
+    """Whether an effect of the recording is not counted as missing from its model.
 
     These are a disturbed pose, which belongs to the session and not to the instrument; an arm of the motion that
-    explains no misfit; and a line that adds less to the scatter inside poses than noise varies between parts.
+    explains no misfit, or beside a model that has no motion; and a line that adds less to the scatter inside poses than
+    noise varies between parts.
     """
     of = by_id()[effect.id]
     share = effect.share or 0.0
-    return of.is_local or (of.is_of_motion and not share) or (of.is_of_samples and share < FAINT)
+    return of.is_local or (of.is_of_motion and not (has_motion and share)) or (of.is_of_samples and share < FAINT)
 
 
 def _is_beside(effect: AcceptedEffect) -> bool:
