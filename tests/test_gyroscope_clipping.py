@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import trihedron
+from diagnosed_session import unit_of
 from hand_made_sessions import G, Instrument, recorded
 from trihedron import calibrate
 from trihedron.estimate.accelerometer.faces import calibrate_faces
@@ -12,6 +14,7 @@ from trihedron.estimate.gyroscope.measurements import bridge_clipping
 from trihedron.records import FindingCode, Recording
 from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
 from trihedron.session.rounding import rounding_of_moves, rounding_variance
+from trihedron.simulate import hand_session, simulate
 from trihedron.units import RateUnit
 from turns_alone import turned
 
@@ -192,3 +195,15 @@ def test_a_gyro_that_clipped_in_most_moves_is_left_out_for_that_reason():
     clipped = replace(log, gyroscope=counts, gyroscope_unit=RateUnit.COUNTS)
     left_out = [f for f in calibrate(clipped, gravity_m_s2=G).findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT]
     assert left_out[0].numbers["n_lost"] > 0.5 * left_out[0].numbers["n_moves"]
+
+
+def test_a_range_limit_met_in_every_move_is_the_physics_that_is_missing():
+    log, _ = simulate(unit_of(hand_session(12, pose_s=2.5, layout=1), 77, is_wide=True), 3)
+    limit = 0.3 * np.abs(log.gyroscope).max()
+    clipped = replace(log, gyroscope=np.clip(log.gyroscope, -limit, limit))
+    found = trihedron.diagnose(clipped, gravity_m_s2=9.80665)
+    assert found.verdict == "missing-physics"
+    assert [effect.id for effect in found.effects] == ["gyro-saturation"]
+    of_codes = [abs(p.value) for p in found.effects[0].parameters if p.name.startswith("raw_")]
+    # Codes are written with nine decimals.
+    assert of_codes == pytest.approx([limit] * len(of_codes), abs=1e-8)

@@ -13,7 +13,7 @@ from trihedron.api.diagnosing_static_log import Calibrated, diagnosed_static_log
 from trihedron.api.reading import AnyRecording, accelerometer_only, recording_of, segments_of
 from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.session.starting_point import is_open
+from trihedron.diagnose.session.starting_point import is_open, starts_nominal
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.gyroscope.common_scale import without_first_scale
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
@@ -150,7 +150,7 @@ def _of_poses(
         findings = [*without_first_scale(findings, of_scale), *of_scale]
     recording_used, segments_used = recording, segments
     # Where the poses do not determine the model, the session state starts from nominal values, for the gyro too.
-    if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
+    if recording.gyroscope is not None and used.gyroscope is None and not (free and starts_nominal(used)):
         findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [
             Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
         ]

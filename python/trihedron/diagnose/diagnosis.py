@@ -27,7 +27,7 @@ from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
-from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal, prior_of, start_state
+from trihedron.diagnose.session.starting_point import linear_model, nominal, prior_of, start_state, starts_nominal
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments
@@ -94,7 +94,7 @@ def _diagnosed(
     obs = observe(recording, segments, calibration.averaging)
     begin = calibration
     prior = prior_of(obs, calibration) if calibration_is_given else None
-    if prior is None and is_open(calibration):
+    if prior is None and starts_nominal(calibration):
         begin = nominal(recording, segments, (calibration.gravity_m_s2, calibration.gravity_source))
         prior = prior_of(obs, begin, is_weak=True)
     answer = _run(obs, start_state(obs, begin), prior, alpha, notify)

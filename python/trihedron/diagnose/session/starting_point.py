@@ -10,6 +10,7 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import LinearModel
+from trihedron.records.finding import FindingCode
 from trihedron.sensor_model import in_frame
 from trihedron.session.model import LOWER, Prior, SessionState
 from trihedron.transforms import directions_of
@@ -59,6 +60,13 @@ def is_open(calibration: Calibration) -> bool:
     scale = float(np.abs(np.linalg.det(sensor.S))) ** (1.0 / 3.0)
     of_scales, of_biases = sigma[:9].max(), sigma[9:].max()
     return bool(of_biases > OPEN_BIAS_M_S2 or of_scales > OPEN_SCALE * scale)
+
+
+def starts_nominal(calibration: Calibration) -> bool:
+    """Whether the fit of a session starts from nominal values: its poses leave the accelerometer undetermined, or so
+    many moves met the gyro's range limit that the others leave the gyro undetermined."""
+    left_out = (f for f in calibration.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT)
+    return is_open(calibration) or any("n_lost" in f.numbers for f in left_out)
 
 
 def nominal(recording: Recording, segments: Segments, gravity: tuple[float, str]) -> Calibration:
