@@ -190,6 +190,24 @@ def test_misfit_that_stays_unexplained_widens_the_uncertainty_of_its_own_sensor(
     assert after[of_gyro] == pytest.approx(3.0 * before[of_gyro], rel=1e-12)
 
 
+def test_a_reversed_gyro_axis_is_an_effect_and_no_other_bias_angle_or_alignment():
+    found = diagnosed("", 3, 12)
+    sense = np.array([1.0, -1.0, 1.0])
+    turned = np.concatenate([np.ones(12), np.tile(sense, 3), np.ones(3)])
+    fit, signs = found.extended, zip("xyz", sense, strict=True)
+    mirrored = replace(
+        fit,
+        gyroscope={**fit.gyroscope, "S": np.array(fit.gyroscope["S"]) * sense},
+        covariance=np.array(fit.covariance) * np.outer(turned, turned),
+    )
+    parameters = tuple(EffectParameter(f"gyro_sign_{axis}", s, 0.0, "1") for axis, s in signs)
+    handed = AcceptedEffect("axis-handedness", "", parameters, 0.0, 99.0, ())
+    plain = model_of_diagnosis(found)
+    seen = model_of_diagnosis(replace(found, extended=mirrored, effects=(handed,)))
+    assert not any(p.significant for p in compare_numbers(plain, seen, alpha=0.01).parameters)
+    assert np.array_equal(seen.covariance, plain.covariance)
+
+
 def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():
     # Six poses of one half: what is open stays open, and the simulation's numbers are no knowledge of this unit's.
     recording, _ = simulate(unit_of(hand_session(9, pose_s=4.0, layout=11), 31), 3)

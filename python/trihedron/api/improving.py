@@ -166,10 +166,10 @@ def _white(axes: Sequence[PoseNoise]) -> list[tuple[float, float] | None]:
 
 
 def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
-    moved = {p.id for p in found.parameters if p.significant}
+    moved = {p.id for p in found.parameters if p.significant} | {effect.id for effect in found.effects}
     fits = (("accelerometer", "accel", found.extended.accelerometer), ("gyroscope", "gyro", found.extended.gyroscope))
     for name, prefix, fit in fits:
-        groups = {f"{prefix}-bias", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
+        groups = {f"{prefix}-bias", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment", "axis-handedness"}
         # S and b of both sensors are in one frame, so that they are replaced together.
         scaled = {n.sensor for n in found.noise_compared if n.term in ("range", "unit") and n.significant}
         if fit is None or not (moved & (groups | {"accel-misalignment", "gravity"}) or scaled):

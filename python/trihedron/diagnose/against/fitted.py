@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
 from trihedron.errors import InputError
 from trihedron.invariants import invariants, jacobian
@@ -95,7 +95,7 @@ def model_of_calibration(calibration: Calibration) -> FittedModel:
 
 
 def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> FittedModel:
-    """The fit of a recording, with its accepted effects or without.
+    """The fit of a recording, with its accepted effects or without, its gyro axes in the sense of the accelerometer's.
 
     Bias change between two sessions: twice the floor of the Allan variance, or what the biases of the poses show
     where that is more (eq. 9.2, 9.3). Misfit of a sensor's own domains that stays unexplained is no noise that the fit
@@ -106,13 +106,25 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
         raise InputError("a diagnosis is compared by its covariance, and this one carries none")
     scale = np.repeat([_unexplained(diagnosis, domains) for domains in OWN_DOMAINS], 12)[: len(fit.covariance)]
     covariance = np.array(fit.covariance) * np.sqrt(np.outer(scale, scale))
+    sense = _sense(diagnosis)
+    turned = np.concatenate([np.ones(12), np.tile(sense, 3), np.ones(3)])[: len(fit.covariance)]
+    covariance *= np.outer(turned, turned)
     of_gyro = np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis))
     accelerometer, gyroscope = (
         None if side is None else FittedSensor(np.array(side["S"]), np.array(side["b"]), str(side["raw_unit"]), drift)
         for side, drift in ((fit.accelerometer, _floor(diagnosis, "accelerometer")), (fit.gyroscope, of_gyro))
     )
     assert accelerometer is not None
+    if gyroscope is not None:
+        gyroscope = replace(gyroscope, S=gyroscope.S * sense)
     return FittedModel(accelerometer, gyroscope, covariance)
+
+
+def _sense(diagnosis: Diagnosis) -> FloatArray:
+    """(3,) -1 for gyro axes reversed against their documentation: an effect, no other bias or angle."""
+    handed = (effect for effect in diagnosis.effects if effect.id == "axis-handedness")
+    signs = {p.name: p.value for effect in handed for p in effect.parameters}
+    return np.array([signs.get(f"gyro_sign_{axis}", 1.0) for axis in AXES])
 
 
 def _unexplained(diagnosis: Diagnosis, domains: frozenset[Domain]) -> float:
