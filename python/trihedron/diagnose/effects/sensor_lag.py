@@ -6,11 +6,13 @@ mean τ²/3, Butterworth's of second order 0. Columns are computed for a time of
 which must come out near one.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on, on_axes, per_axis
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axes, per_axis
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.records.diagnosis import EffectParameter
 
@@ -36,13 +38,32 @@ def is_near_one(value: FloatArray, covariance: FloatArray) -> bool:
     return bool(NEAR_ONE[0] - sigma < value[0] < NEAR_ONE[1] + sigma)
 
 
-class SensorLag(Effect):
+class _Late(Effect):
+    """Readings of one sensor that trail the motion. One more parameter is no part of it: the smoothing of both sensors
+    beyond that of the session (eq. 11.6d), which a calibration finds wrong where one is late."""
+
+    needs_moves = True
+    size = 0.015
+    """s: one or two samples of a slow log, or the delay of a filter."""
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        sizes = super().sizes(context, variant)
+        if variant.names[-1] == BOTH:
+            sizes[1:] = SMOOTHING_SIGMA[-len(sizes) + 1 :]
+        return sizes
+
+    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        return is_near_one(value, covariance) and value[0] > 0.0
+
+    def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
+        every = super().parameters(variant, value, covariance)
+        return tuple(one for one in every if one.name != BOTH)
+
+
+class SensorLag(_Late):
     """Low-pass of one sensor's readings: its lag τ and smoothing v/τ, or a lag of first order per axis."""
 
     id = "sensor-lag"
-    needs_moves = True
-    size = 0.015
-    """s: the delay of a filter."""
 
     def variants(self, context: Context) -> list[Variant]:
         out = []
@@ -69,15 +90,11 @@ class SensorLag(Effect):
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         if SEPARATE in variant.label:
             return bool((value > -SIGMAS * sigmas_of(covariance)).all() and (value > 0.0).any())
-        return is_near_one(value, covariance) and value[0] > 0.0
-
-    def sizes(self, context: Context, variant: Variant) -> FloatArray:
-        sizes = super().sizes(context, variant)
-        return sizes if SEPARATE in variant.label else np.array([sizes[0], *SMOOTHING_SIGMA][: len(sizes)])
+        return super().is_plausible(variant, value, covariance)
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         every = super().parameters(variant, value, covariance)
-        if variant.names[-1] != BOTH:
+        if SEPARATE in variant.label or DELAYS in variant.label:
             return every
         of_lag, name = np.array([USUAL_SMOOTHING, 1.0]), variant.names[1]
         std = float(np.sqrt(of_lag @ covariance[:2, :2] @ of_lag))
@@ -86,7 +103,7 @@ class SensorLag(Effect):
 
 def _low_pass(context: Context, sensor: int, lag_s: float, label: str) -> Variant:
     """What a low-pass adds to readings: by a lag of this size with the usual variance for it, by a variance of the
-    square of this size beyond that, and by one of both sensors beyond that of the session (eq. 11.6d), no effect.
+    square of this size beyond that, and by one of both sensors; a delay has no variance of its own.
 
     That of the gyro on a clock that is late by the lag: the accelerometer is early, and the rate keeps its phase. With
     the lag in the rate a fit that begins without one ends in another minimum.
@@ -104,17 +121,17 @@ def _low_pass(context: Context, sensor: int, lag_s: float, label: str) -> Varian
     usual = 0.0 if DELAYS in label else USUAL_SMOOTHING
     force = np.stack([early + usual * own[0], own[0], of_force], axis=2)
     rate = np.stack([usual * own[1], own[1], of_rate], axis=2)
-    names, n = (f"{SENSORS[sensor].label}_lag", f"{SENSORS[sensor].label}_smoothing", BOTH), 1 if DELAYS in label else 3
-    return Variant(Distortion(force, rate).of(range(n)), names[:n], ("s",) * n, label=label, scale=lag_s)
+    names, part = (f"{SENSORS[sensor].label}_lag", f"{SENSORS[sensor].label}_smoothing", BOTH), [0, 1, 2]
+    if DELAYS in label:
+        part = [0, 2]
+    columns = Distortion(force, rate).of(part)
+    return Variant(columns, tuple(names[k] for k in part), ("s",) * len(part), label=label, scale=lag_s)
 
 
-class AccelGyroTimeOffset(Effect):
+class AccelGyroTimeOffset(_Late):
     """Accelerometer readings belong to an earlier instant: the reading at t is f(t − δ); at δ < 0 the gyro is late."""
 
     id = "accel-gyro-time-offset"
-    needs_moves = True
-    size = 0.015
-    """s: one or two samples of a slow log, or the delay of a filter."""
 
     def variants(self, context: Context) -> list[Variant]:
         return [_offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in TIMES_S for sign in (1.0, -1.0)]
@@ -122,11 +139,8 @@ class AccelGyroTimeOffset(Effect):
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
         return _offset(context, variant.scale * float(value[0]), variant.label)
 
-    def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        return is_near_one(value, covariance) and value[0] > 0.0
-
 
 def _offset(context: Context, delay_s: float, label: str) -> Variant:
-    """What a delay adds to readings: y(t) - y(t + δ)."""
-    column = context.force - context.shifted(context.force, delay_s)
-    return Variant(acting_on(0, column[:, :, None]), ("accelerometer_delay",), ("s",), label=label, scale=delay_s)
+    """What a delay adds to readings."""
+    late = _low_pass(context, int(delay_s < 0.0), abs(delay_s), DELAYS)
+    return replace(late, names=("accelerometer_delay", BOTH), label=label, scale=delay_s)
