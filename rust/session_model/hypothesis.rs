@@ -21,7 +21,6 @@ const RENEWALS: usize = 4;
 const SAME_WEIGHT: f64 = 0.2;
 
 /// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
-#[derive(Clone)]
 pub(super) struct Part {
     pub chain: Chain,
     pub side: DMatrix<f64>,
@@ -36,7 +35,6 @@ pub(super) struct Weighed {
 }
 
 /// A session at one state, its rows by process; those of moves are not whitened yet.
-#[derive(Clone)]
 pub struct Hypothesis {
     layout: Layout,
     at: Strengths,
@@ -265,14 +263,12 @@ impl Hypothesis {
     /// When there are no `starts`, or the session is undetermined there.
     pub fn tuned(mut self, starts: &[Strengths], within: &Within) -> Result<Found> {
         let (mut strengths, _) = self.likeliest(starts, within)?;
-        self.settle(&mut strengths, within)?;
-        if self.n_added > 0
-            && let Some((mut other, mut at)) = self.explained(starts)?
-            && other.at_each(&[at])[0] > self.at_each(&[strengths])[0]
-        {
-            (at, _) = other.likeliest(&[at], within)?;
-            other.settle(&mut at, within)?;
-            (self, strengths) = (other, at);
+        for _ in 0..RENEWALS {
+            let step = -self.solved(&strengths)?.column(0);
+            if !self.renew(&strengths, &step) {
+                break;
+            }
+            (strengths, _) = self.likeliest(&[strengths], within)?;
         }
         let log_evidence = self.at_each(&[strengths])[0];
         let first = self.layout.border - self.n_added;
@@ -285,32 +281,6 @@ impl Hypothesis {
                 .view((first, 1), (self.n_added, self.n_added))
                 .into_owned(),
         })
-    }
-
-    /// Renews the weights of moves and searches again until they do not change.
-    fn settle(&mut self, strengths: &mut Strengths, within: &Within) -> Result<()> {
-        for _ in 0..RENEWALS {
-            let step = -self.solved(strengths)?.column(0);
-            if !self.renew(strengths, &step) {
-                break;
-            }
-            (*strengths, _) = self.likeliest(&[*strengths], within)?;
-        }
-        Ok(())
-    }
-
-    /// The hypothesis with the weights of moves by what the added parameters leave at the best of `starts` if no move
-    /// had tails: what explains moves that were in the tails is not seen from the weights that they had.
-    fn explained(&self, starts: &[Strengths]) -> Result<Option<(Self, Strengths)>> {
-        let mut gaussian = self.clone().without_tails();
-        let values = gaussian.at_each(starts);
-        let pairs = starts.iter().copied().zip(values);
-        let Some((at, _)) = pairs.max_by(|a, b| a.1.total_cmp(&b.1)) else {
-            return Ok(None);
-        };
-        let step = -gaussian.solved(&at)?.column(0);
-        gaussian.renew(&at, &step);
-        Ok(Some((gaussian, at)))
     }
 
     /// `(unknowns, 1 + added)` the step away from the optimum, and the covariance of all unknowns with those added.

@@ -10,7 +10,6 @@ use super::rows::Group;
 
 /// A move in SI: derivatives with respect to the border, the pose before and the pose after, and the residual, column
 /// after column; and the terms of its covariance.
-#[derive(Clone)]
 pub(super) struct Open {
     pub pose: usize,
     pub columns: DMatrix<f64>,

@@ -16,8 +16,8 @@ from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axe
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.records.diagnosis import EffectParameter
 
-TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
-"""Times tried, s, each twice the one before: a parameter from 1/√2 to √2 covers the times between."""
+TIMES_S = (0.004, 0.016, 0.064)
+"""Times tried, s, each four times the one before; of those between, the columns are computed for the size found."""
 NEAR_ONE = (0.6, 1.6)
 """Range of a confirmed parameter: outside it another time of the grid fits better, or the mechanism does not."""
 LEAST_STEPS = 0.25
@@ -26,9 +26,9 @@ SIGMAS = 3.0
 """Standard errors by which a lag may be negative: filters are causal."""
 AXES_S = 0.01
 """s: unit of the columns of single axes; their parameters are lags in hundredths of a second."""
-USUAL_SMOOTHING, SMOOTHING_SIGMA = 0.5, (0.35, 1.0)
-"""Variance of a filter's response over the square of its lag: from 0 to 1; prior σ about it, and of one that both
-sensors have beyond that of the session."""
+SMOOTHING_SIGMA = (0.6, 1.0)
+"""Prior σ of the variance of a filter's response over the square of its lag, which is between 0 and 1, and of one that
+both sensors have beyond that of the session."""
 SEPARATE, DELAYS, BOTH = "per axis", ", without smoothing", "smoothing_of_both"
 
 
@@ -74,36 +74,29 @@ class SensorLag(_Late):
         # A shorter time than the sampling resolves is that of a delay.
         least_s = LEAST_STEPS / context.obs.recording.rate_hz
         times = [t for t in TIMES_S if t >= least_s] or [TIMES_S[-1]]
-        return out + [
-            _low_pass(context, sensor, t, f"{side.label}, {1e3 * t:.0f} ms{shape}")
+        every = [
+            _low_pass(context, sensor, t, f"{side.label}, {1e3 * t:.0f} ms")
             for t in times
             for sensor, side in enumerate(SENSORS)
-            for shape in ("", DELAYS)
         ]
+        return [*out, *every, *(_unsmoothed(one) for one in every)]
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
         if SEPARATE in variant.label or not value[0] > 0.0:
             return None
         sensor = int(variant.label.startswith(SENSORS[1].label))
-        return _low_pass(context, sensor, variant.scale * float(value[0]), variant.label)
+        made = _low_pass(context, sensor, variant.scale * float(value[0]), variant.label.removesuffix(DELAYS))
+        return _unsmoothed(made) if variant.label.endswith(DELAYS) else made
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         if SEPARATE in variant.label:
             return bool((value > -SIGMAS * sigmas_of(covariance)).all() and (value > 0.0).any())
         return super().is_plausible(variant, value, covariance)
 
-    def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
-        every = super().parameters(variant, value, covariance)
-        if SEPARATE in variant.label or DELAYS in variant.label:
-            return every
-        of_lag, name = np.array([USUAL_SMOOTHING, 1.0]), variant.names[1]
-        std = float(np.sqrt(of_lag @ covariance[:2, :2] @ of_lag))
-        return every[0], EffectParameter(name, variant.scale * float(of_lag @ value[:2]), variant.scale * std, "s")
-
 
 def _low_pass(context: Context, sensor: int, lag_s: float, label: str) -> Variant:
-    """What a low-pass adds to readings: by a lag of this size with the usual variance for it, by a variance of the
-    square of this size beyond that, and by one of both sensors; a delay has no variance of its own.
+    """What a low-pass adds to readings: by a lag of this size, by a variance of its square, and by one of both
+    sensors.
 
     That of the gyro on a clock that is late by the lag: the accelerometer is early, and the rate keeps its phase. With
     the lag in the rate a fit that begins without one ends in another minimum.
@@ -116,16 +109,17 @@ def _low_pass(context: Context, sensor: int, lag_s: float, label: str) -> Varian
 
     early_s = -lag_s if sensor else lag_s
     early, none = context.force - context.shifted(context.force, early_s), np.zeros_like(context.force)
-    of_force, of_rate = smoothed(context.force, early_s), smoothed(context.rate, 0.0)
-    own = (none, of_rate) if sensor else (of_force, none)
-    usual = 0.0 if DELAYS in label else USUAL_SMOOTHING
-    force = np.stack([early + usual * own[0], own[0], of_force], axis=2)
-    rate = np.stack([usual * own[1], own[1], of_rate], axis=2)
-    names, part = (f"{SENSORS[sensor].label}_lag", f"{SENSORS[sensor].label}_smoothing", BOTH), [0, 1, 2]
-    if DELAYS in label:
-        part = [0, 2]
-    columns = Distortion(force, rate).of(part)
-    return Variant(columns, tuple(names[k] for k in part), ("s",) * len(part), label=label, scale=lag_s)
+    both = smoothed(context.force, early_s), smoothed(context.rate, 0.0)
+    own = (none, both[1]) if sensor else (both[0], none)
+    columns = (np.stack(side, axis=2) for side in ((early, own[0], both[0]), (none, own[1], both[1])))
+    names = f"{SENSORS[sensor].label}_lag", f"{SENSORS[sensor].label}_smoothing", BOTH
+    return Variant(Distortion(*columns), names, ("s",) * 3, label=label, scale=lag_s)
+
+
+def _unsmoothed(low_pass: Variant) -> Variant:
+    """A low-pass that does not smooth, or a delay."""
+    columns, names = low_pass.distortion.of((0, 2)), (low_pass.names[0], BOTH)
+    return replace(low_pass, distortion=columns, names=names, units=("s",) * 2, label=low_pass.label + DELAYS)
 
 
 class AccelGyroTimeOffset(_Late):
@@ -134,7 +128,7 @@ class AccelGyroTimeOffset(_Late):
     id = "accel-gyro-time-offset"
 
     def variants(self, context: Context) -> list[Variant]:
-        return [_offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in TIMES_S for sign in (1.0, -1.0)]
+        return [_offset(context, t, f"{1e3 * t:.0f} ms") for t in TIMES_S]
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
         return _offset(context, variant.scale * float(value[0]), variant.label)
@@ -142,5 +136,5 @@ class AccelGyroTimeOffset(_Late):
 
 def _offset(context: Context, delay_s: float, label: str) -> Variant:
     """What a delay adds to readings."""
-    late = _low_pass(context, int(delay_s < 0.0), abs(delay_s), DELAYS)
+    late = _unsmoothed(_low_pass(context, int(delay_s < 0.0), abs(delay_s), ""))
     return replace(late, names=("accelerometer_delay", BOTH), label=label, scale=delay_s)
