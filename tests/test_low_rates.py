@@ -71,7 +71,7 @@ def test_a_low_pass_of_one_sensor_has_its_lag_and_smoothing_and_no_delay_beside_
     # Of normal errors one in 10⁴ exceeds four standard deviations; the next term of the response is of third order, a
     # percent of the lag squared.
     assert abs(found["lag"].value - n_poles * lag) < 4.0 * found["lag"].std
-    assert found["smoothing"].value == pytest.approx(lag, rel=0.2, abs=4.0 * found["smoothing"].std)
+    assert found["smoothing"].value == pytest.approx(1.0 / n_poles, rel=0.2, abs=4.0 * found["smoothing"].std)
 
 
 def test_averaging_is_the_variance_of_the_filter():

@@ -56,12 +56,16 @@ class _Late(Effect):
         return is_near_one(value, covariance) and value[0] > 0.0
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
-        every = super().parameters(variant, value, covariance)
-        return tuple(one for one in every if one.name != BOTH)
+        lags = super().parameters(variant, value, covariance)
+        if variant.names[-1] != BOTH:
+            return lags
+        std, smoothing = sigmas_of(covariance), slice(1, len(value) - 1)
+        of_square = zip(variant.names[smoothing], value[smoothing], std[smoothing], strict=True)
+        return lags[0], *(EffectParameter(name, float(v), float(s), "1") for name, v, s in of_square)
 
 
 class SensorLag(_Late):
-    """Low-pass of one sensor's readings: its lag τ and smoothing v/τ, or a lag of first order per axis."""
+    """Low-pass of one sensor's readings: its lag τ and smoothing v/τ², or a lag of first order per axis."""
 
     id = "sensor-lag"
 

@@ -46,30 +46,9 @@ def without_invalid(sensors: Sensors, rate_hz: float) -> tuple[Sensors, list[Fin
         single.append(alone)
         stuck += _stuck(sensor, readings, step, windows, sensors)
     findings = [finding for finding, _ in stuck]
-    if np.any(wrapped):
-        findings.append(
-            Finding.of(
-                FindingCode.INVALID_READINGS,
-                "wrapped",
-                severity=Severity.WARNING if _share(wrapped) < LONG else Severity.SERIOUS,
-                counts=_counts(wrapped, sensors),
-                count=int(np.sum(wrapped)),
-                where=sensors.place(_first(wrapped)),
-                sample=_first(wrapped),
-            )
-        )
-    if np.any(single):
-        findings.append(
-            Finding.of(
-                FindingCode.INVALID_READINGS,
-                "isolated",
-                severity=Severity.WARNING if _share(single) < LONG else Severity.SERIOUS,
-                counts=_counts(single, sensors),
-                count=int(np.sum(single)),
-                where=sensors.place(_first(single)),
-                sample=_first(single),
-            )
-        )
+    for case, rows in (("wrapped", wrapped), ("isolated", single)):
+        if np.any(rows):
+            findings.append(_invalid(case, rows, sensors))
     bad = np.any([*single, *wrapped, *(rows for _, rows in stuck)], axis=0)
     if not findings or bad.mean() >= HALF:
         return sensors, findings
@@ -81,17 +60,19 @@ FEWEST = 64
 """Rows of a log below which its noise is not known well enough to judge single readings."""
 
 
-def _counts(rows: list[BoolArray], sensors: Sensors) -> list[tuple[str, int]]:
-    """Number of ``rows`` (n,) of each sensor that has any."""
-    return [(short(sensor), int(one.sum())) for sensor, one in zip(sensors.triads, rows, strict=True) if one.any()]
-
-
-def _first(rows: list[BoolArray]) -> int:
-    return int(np.argmax(np.any(rows, axis=0)))
-
-
-def _share(rows: list[BoolArray]) -> float:
-    return float(np.mean(np.any(rows, axis=0)))
+def _invalid(case: str, rows: list[BoolArray], sensors: Sensors) -> Finding:
+    """The finding of invalid ``rows`` (n,) of each sensor."""
+    every = np.any(rows, axis=0)
+    of_each = zip(sensors.triads, rows, strict=True)
+    return Finding.of(
+        FindingCode.INVALID_READINGS,
+        case,
+        severity=Severity.WARNING if every.mean() < LONG else Severity.SERIOUS,
+        counts=[(short(sensor), int(one.sum())) for sensor, one in of_each if one.any()],
+        count=int(np.sum(rows)),
+        where=sensors.place(int(np.argmax(every))),
+        sample=int(np.argmax(every)),
+    )
 
 
 def _at(sensors: Sensors, samples: IntArray) -> Sensors:
