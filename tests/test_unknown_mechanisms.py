@@ -73,3 +73,16 @@ def test_a_smooth_drift_of_twelve_errors_of_a_pose_is_a_drift():
     parabola = (2.0 * recording.time_s / recording.time_s[-1] - 1.0) ** 2
     found = found_with(rate=12.0 * np.outer(parabola, error))
     assert [one.id for one in found.effects] == ["gyro-bias-drift"]
+
+
+def test_a_bias_that_steps_once_is_a_drift_by_that_step_and_at_its_time():
+    recording, *_ = session()
+    at, step = 0.6 * recording.time_s[-1], np.array([0.1, -0.2, 0.05])
+    found = found_with(rate=(recording.time_s > at)[:, None] * step * DEG, scatter=0.01 * DEG)
+    drift = found.effects[0]
+    assert (drift.id, drift.model["variant"]) == ("gyro-bias-drift", "step")
+    (place,) = [one for one in drift.parameters if one.name == "step_time"]
+    # Between two poses: uniform.
+    assert abs(place.value - at) < np.sqrt(3.0) * place.std
+    sizes = [one for one in drift.parameters if one.name.startswith("step_") and one is not place]
+    assert all(abs(np.degrees(one.value) - of) < 4.0 * np.degrees(one.std) for one, of in zip(sizes, step, strict=True))

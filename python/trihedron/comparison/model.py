@@ -10,7 +10,7 @@ from trihedron.arrays import TINY, FloatArray, rms_of
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.rows import SENSORS, difference
 from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration, model_of_diagnosis
-from trihedron.diagnose.against.mechanisms import FREE_CURVE, compare_effects, left_open_by
+from trihedron.diagnose.against.mechanisms import FREE_CURVES, compare_effects, left_open_by
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor, compare_numbers
 from trihedron.probability import f_upper
 from trihedron.records import Calibration, Recording, Segments, Verification
@@ -171,7 +171,7 @@ def _without_walk(
         slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
         if slow and min(slow) >= 1.0:
             drawn.add(drift)
-    return tuple(e for e in effects if e.id not in drawn or e.model.get("variant") != FREE_CURVE)
+    return tuple(e for e in effects if e.id not in drawn or e.model.get("variant") not in FREE_CURVES)
 
 
 def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:

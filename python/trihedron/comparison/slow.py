@@ -10,7 +10,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, measured_row
-from trihedron.diagnose.against.mechanisms import FREE_CURVE
+from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow, correlation_time
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
@@ -136,7 +136,7 @@ def _has_curve(found: Diagnosis, sensor: Sensor) -> bool:
     """Whether the only effect on a sensor's biases, beside their scatter, is a drift along a free curve."""
     domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-bias-drift"
     of_biases = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
-    return len(of_biases) == 1 and of_biases[0].id == drift and of_biases[0].model.get("variant") == FREE_CURVE
+    return len(of_biases) == 1 and of_biases[0].id == drift and of_biases[0].model.get("variant") in FREE_CURVES
 
 
 def _biases(

@@ -120,7 +120,7 @@ def terms_of(model: Hypothesis, effect: Effect, price: float) -> list[Term]:
     context, places = model.context, {(t.effect.id, t.variant.label) for t in model.terms}
     variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
     of_kind = Counter(v.label for v in variants)
-    tried = [len(of_kind) * of_kind[v.label] * len(PRIOR_SCALES) for v in variants]
+    tried = [len(of_kind) * of_kind[v.label] * v.n_places * len(PRIOR_SCALES) for v in variants]
     costs = price + 2.0 * np.log(tried)
     return [Term(effect, v, effect.sizes(context, v), float(cost)) for v, cost in zip(variants, costs, strict=True)]
 

@@ -104,6 +104,25 @@ class Context:
             out[where] = state.gravity * path.attitude[where.start - h : where.stop - h] @ state.up[before]
         return out
 
+    @cached_property
+    def norm_columns(self) -> FloatArray:
+        """(poses, 9) what the norm of gravity reads of S and b: the vertical and its products."""
+        up = self.fitted.state.up
+        return np.column_stack([up, *(up[:, j] * up[:, k] for j in range(3) for k in range(j, 3))])
+
+    def static_errors(self, sensor: int) -> FloatArray:
+        """(poses, 3) what the means over the poses read beyond gravity and the effects of the hypothesis, SI, body."""
+        obs, state, distortion = self.obs, self.fitted.state, self.fitted.distortion
+        if sensor:
+            assert obs.pose_rate is not None
+            error, effects = obs.pose_rate @ state.gyro_S.T, distortion.rate
+        else:
+            error, effects = (
+                obs.pose_force @ state.accel_S.T + state.accel_b - state.gravity * state.up,
+                distortion.force,
+            )
+        return np.asarray(error if effects is None else error - effects[: len(error)] @ state.effect)
+
     # -- sensor axes ----------------------------------------------------------------------------------------------
     @cached_property
     def accel_axes(self) -> FloatArray:

@@ -164,7 +164,7 @@ def _of_term(
         along = np.asarray(term.distortion.rate)[: obs.n_poses]
         sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
         span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
-        parameters, statement = effect.of_curve(span, np.sqrt(2.0) * sigma, is_counts=is_counts)
+        parameters, statement = effect.of_curve(term.variant, span, np.sqrt(2.0) * sigma, is_counts=is_counts)
         series = _series(obs, along @ value, sigma, unit)
     said = parameters, statement, p_value, found.scores[k]
     return effect_record(effect, *said, held, rivals, curves, **series), p_value, parameters
@@ -225,6 +225,7 @@ def _aside(effect: Effect, sensor: int, pieces: StaticPieces, count: float) -> E
         "variants": lambda self, context: [turned(one) for one in kind.variants(self, context)],
         "reshaped": lambda self, context, variant, value: turned(kind.reshaped(self, context, variant, value)),
         "is_plausible": is_plausible,
+        "shows_as": GYRO,
     }
     out: Effect = type(kind.__name__, (kind,), own)()
     return out

@@ -10,7 +10,7 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table, undetermined
 from trihedron.report.chart import Chart
-from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures, stages_pictures
+from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures
 from trihedron.report.diagnosis_headlines import differing_headline, headlines_of
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_next_step import next_step_in_words
@@ -40,7 +40,7 @@ from trihedron.report.diagnosis_words import (
     whole_verdict,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
-from trihedron.report.effect_charts import alike, effect_chart
+from trihedron.report.effect_charts import effect_chart
 from trihedron.report.findings import findings_block
 from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number
@@ -79,8 +79,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         Section("Calibration and noise", _models(diagnosis)),
     ]
     if diagnosis.parameters:
-        stages = (*stages_pictures(diagnosis), *stages_blocks(diagnosis, MEANING))
-        sections.append(Section("Stage by stage", stages))
+        sections.append(Section("Stage by stage", stages_blocks(diagnosis, MEANING)))
         sections += [Section("Parameters that agree", (table,)) for table in numbers_blocks(diagnosis)]
     if diagnosis.noise_compared:
         noise = (*ratios_picture(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
@@ -295,27 +294,14 @@ def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
 
 
 def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:
-    """One picture per effect, where the recording is given and the effect acts on single poses or moves."""
-    # Forces are computed with the recording's own calibration: a given model's may be of another sensor and unit.
-    own = getattr(diagnosis, "updated", None) or getattr(diagnosis, "calibration", None)
-    made = [getattr(diagnosis, "recording", None), getattr(diagnosis, "segments", None), own]
-    if any(one is None for one in made):
-        return []
+    """A picture of every effect that is a curve over one variable."""
     out = []
-    for effects in alike(diagnosis.effects, diagnosis.residuals):
-        chart = effect_chart(effects[0], diagnosis.residuals, *made)  # type: ignore[arg-type]
-        if chart is not None:
-            caption = f"{capital(ids_in_print(effect.id for effect in effects))}: {_drawn_in_words(effects[0])}."
-            out.append(Picture(f"effect-{effects[0].id}", caption, lambda drawn=chart: drawn))  # type: ignore[misc]
+    for effect in diagnosis.effects:
+        if effect.curves:
+            dots = ", with what poses show (dots)" if any(len(one.data) for one in effect.curves) else ""
+            caption = f"{capital(id_in_print(effect.id))}: what it adds, over the variable that drives it{dots}."
+            out.append(Picture(f"effect-{effect.id}", caption, partial(effect_chart, effect.curves)))
     return out
-
-
-def _drawn_in_words(effect: AcceptedEffect) -> str:
-    if not effect.curves:
-        return "the residual without effects, and the part of it that all effects together explain"
-    beside = any(len(one.data) for one in effect.curves)
-    shown = "with what poses show (dots)" if beside else "and the residual of the moves in which it acts"
-    return f"what it adds, over the variable that drives it, {shown}"
 
 
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:

@@ -1,4 +1,4 @@
-"""Charts of a diagnosis: residuals before and after the effects; of a model: errors by stage, spectra, Allan curves."""
+"""Charts of a diagnosis: residuals before and after the effects; spectra of a model's noise beside the log's."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,20 +13,10 @@ from trihedron.report.chart import AXIS_COLOURS, MOST_OF_A_BAR, Chart, Colour, L
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.names import axis_in_print, channel_in_print
-from trihedron.report.numbers import plain_number, shown
+from trihedron.report.numbers import shown
 
 Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
-WORDS = {
-    "static-accel": "gravity error in static poses",
-    "static-gyro": "gyro rate in static poses",
-    "moves": "tilt error after rotations",
-    "dynamics": "velocity error over a rotation",
-}
-SLOPES: tuple[Colour, ...] = ("c1", "c2", "c3", "accent")
-FEWEST_STAGES = 3
 FEWEST_OCTAVES = 2
-PER_OCTAVE = 24
-"""Frequencies per octave of the integral: at the longest averaging time sin⁴ oscillates within the upper octaves."""
 SENSORS = ("accelerometer", "gyroscope")
 Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 """Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
@@ -84,48 +74,12 @@ def _bars_of_noise(time_s: FloatArray, sigma: FloatArray, *, is_angle: bool) -> 
     return Line(x, y, "2 σ of noise", "shade")
 
 
-def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Cross-validated misfit after every stage."""
-    if len(diagnosis.stages) < FEWEST_STAGES:
-        return ()
-    caption = "Cross-validated misfit, stage by stage: as given, with the recording's own parameters, noise, effects; "
-    caption += "1 where noise and uncertainty explain it."
-    return (Picture("stages", caption, partial(stages_chart, diagnosis)),)
-
-
 def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Spectra and Allan curves of both logs."""
-    seen = _spectra(diagnosis.noise_compared)
-    if not seen:
+    """Spectra of both logs."""
+    if not _spectra(diagnosis.noise_compared):
         return ()
-    first = "Noise inside poses, model (dashed) and recording, in octaves that both logs show."
-    second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
-    spectra = Picture("spectra-both", first, partial(spectra_chart, diagnosis))
-    if not any(len(_without_gaps(*one)[0]) >= FEWEST_OCTAVES for one in seen.values()):
-        return (spectra,)
-    return spectra, Picture("allan-both", second, partial(allan_chart, diagnosis))
-
-
-def stages_chart(diagnosis: Diagnosis) -> Chart:
-    """One line per domain: χ² per degree of freedom after every stage, since units differ."""
-    names = tuple(stage.stage.replace("-", " ") for stage in diagnosis.stages)
-    marks: list[Mark] = [Level(y=1.0, name="noise and uncertainty alone", is_dashed=True)]
-    for (domain, words), colour in zip(WORDS.items(), SLOPES, strict=True):
-        found = [(k, d) for k, stage in enumerate(diagnosis.stages, 1) for d in stage.domains if d.domain == domain]
-        found = [(k, d) for k, d in found if d.chi2_per_dof]
-        if len(found) < FEWEST_OCTAVES:
-            continue
-        factor, unit = shown(found[0][1].unit)
-        x = np.array([k for k, _ in found], dtype=np.float64)
-        y = np.array([d.chi2_per_dof for _, d in found], dtype=np.float64)
-        tips = [
-            f"{words}, {names[k - 1]}: χ²/dof {plain_number(v)}, {plain_number(factor * d.rms)} {unit} rms"
-            for (k, d), v in zip(found, y, strict=True)
-        ]
-        marks += [Line(x, y, "", colour), Points(x, y, tips, None, words, colour)]
-    along = Scale("stage", "", limits=(0.6, len(names) + 0.4), whole=True, names=names)
-    up = Scale("χ² per degree of freedom", is_log=True, includes=(1.0,))
-    return Chart((Panel(along, up, tuple(marks), height_px=260),))
+    caption = "Noise inside poses, model (dashed) and recording, in octaves that both logs show."
+    return (Picture("spectra-both", caption, partial(spectra_chart, diagnosis)),)
 
 
 def spectra_chart(diagnosis: Diagnosis) -> Chart:
@@ -138,35 +92,6 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
         scales = Scale("frequency [Hz]", "Hz", is_log=True), Scale(f"density [{unit}]", unit, is_log=True)
         panels.append(_panel(scales, lines, f"{_said(sensor)} {axis_in_print(axis)}"))
     return Chart(tuple(panels), columns=3)
-
-
-def allan_chart(diagnosis: Diagnosis) -> Chart:
-    """A panel per sensor and axis: Allan deviation of a spectrum that is constant within its octaves.
-
-    ``σ²(τ) = 4 ∫ S sin⁴(πτf)/(πτf)² df``, S two-sided, for τ from half a period of the highest frequency to a quarter
-    of the lowest's: for longer τ, noise below the lowest octave would be missing.
-    """
-    panels = []
-    for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
-        unit = _unit(sensor)
-        edges, model, own = _without_gaps(edges, model, own)
-        if len(edges) < FEWEST_OCTAVES:
-            continue
-        tau = np.geomspace(0.5 / edges[-1, 1], 0.25 / edges[0, 0], 60)
-        lines = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau))
-        scales = Scale("averaging time τ [s]", "s", is_log=True), Scale(f"Allan deviation [{unit}]", unit, is_log=True)
-        panels.append(_panel(scales, lines, f"{_said(sensor)} {axis_in_print(axis)}"))
-    return Chart(tuple(panels), columns=3)
-
-
-def allan_of(edges_hz: FloatArray, density: FloatArray, tau_s: FloatArray) -> FloatArray:
-    """(k,) Allan deviation at ``tau_s`` (k,) of root densities (m,) in bands ``edges_hz`` (m, 2), their unit·√Hz."""
-    out = np.zeros(len(tau_s))
-    for (low, high), root in zip(edges_hz, density, strict=True):
-        f = low + (high - low) * (np.arange(PER_OCTAVE) + 0.5) / PER_OCTAVE
-        x = np.pi * np.multiply.outer(tau_s, f)
-        out += 4.0 * root**2 * (np.sin(x) ** 4 / x**2).mean(axis=1) * (high - low)
-    return np.sqrt(out)
 
 
 def _both(x: FloatArray, model: FloatArray, own: FloatArray) -> tuple[Line, Line]:
@@ -191,13 +116,6 @@ def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spect
             table = np.array(sorted(found))
             out[key] = table[:, :2], table[:, 2], table[:, 3]
     return out
-
-
-def _without_gaps(edges: FloatArray, model: FloatArray, own: FloatArray) -> Spectrum:
-    """The longest run of contiguous octaves: a missing band would appear as a dip and a ripple."""
-    runs = np.split(np.arange(len(edges)), 1 + np.flatnonzero(~np.isclose(edges[1:, 0], edges[:-1, 1])))
-    longest = max(runs, key=len)
-    return edges[longest], model[longest], own[longest]
 
 
 def _unit(sensor: str) -> str:

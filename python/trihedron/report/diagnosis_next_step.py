@@ -3,10 +3,8 @@
 from pathlib import PurePath
 from shlex import quote
 
-import numpy as np
-
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
+from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.noise import least_length_s
 from trihedron.report.calibration import errors_in_words, errors_of
 from trihedron.report.diagnosis_numbers import of_another_device
@@ -23,15 +21,13 @@ from trihedron.report.diagnosis_words import (
 from trihedron.report.document import action_in_words
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import id_in_print, ids_in_print
-from trihedron.report.numbers import capital, duration, listed
+from trihedron.report.numbers import capital, listed
 from trihedron.report.verification import imprecise
 
 FOUND = ("missing-physics", "unexplained")
 """Verdicts with something to do about the readings."""
 FAR = 2.0
 """Error over noise from which a remedy comes before the use of a calibration."""
-LAST = 0.1
-"""Share of a log, at its end, whose mean is the end of a drift; share of its range that is left of one that ended."""
 STORED = "`trihedron calibrate LOG --extended -o calibration.json`"
 """The command that stores the effects of a log with its S and b."""
 
@@ -150,20 +146,7 @@ def _in_the_next_log(diagnosis: Diagnosis) -> str:
     own = [one for one in own if one.id not in IN_FULL]
     shown = (one for one in own if {held.domain for held in one.held_out} != {"dynamics"})
     advice = ((one, experiment(one.id)) for one in shown)
-    return next((f"Against {id_in_print(one.id)}{_ended(one)}: {said}." for one, said in advice if said), "")
-
-
-def _ended(effect: AcceptedEffect) -> str:
-    """When a bias drift ended that did; empty where the log ends before."""
-    curve = effect.model.get("curve")
-    if curve is None:
-        return ""
-    time_s, value = np.asarray(curve["time_s"]), np.asarray(curve["value"])
-    end = value[:, time_s > time_s[-1] - LAST * (time_s[-1] - time_s[0])].mean(axis=1, keepdims=True)
-    is_moving = (np.abs(value - end) > LAST * np.ptp(value, axis=1, keepdims=True)).any(axis=0)
-    last_s = float(time_s[is_moving].max(initial=0.0))
-    is_over = last_s < 0.5 * (time_s[0] + time_s[-1])
-    return f", nine tenths of which were over after {duration(last_s)}" if is_over else ""
+    return next((f"Against {id_in_print(one.id)}: {said}." for one, said in advice if said), "")
 
 
 def _misread(diagnosis: Diagnosis) -> Finding | None:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from trihedron.records.recording import as_arguments, distinct_names
-from trihedron.records.shared_effects import SharedCandidate, SharedDiagnosis, SharedEffect
-from trihedron.report.chart import ROW_PX, TWO_SIGMA, Bars, Chart, Level, Panel, Points, Scale, around_zero
+from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
+from trihedron.report.chart import ROW_PX, TWO_SIGMA, Chart, Level, Panel, Points, Scale, around_zero
 from trihedron.report.diagnosis_words import (
     level_of,
     p_in_words,
@@ -24,8 +24,6 @@ from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, listed, plain_number, with_sigma
 
 COLUMNS = 3
-BAR = 0.7
-"""Height of a bar as a fraction of its row."""
 LONGEST = 16
 """Most letters of a name beside its row; recordings with longer names are numbered, as in the title."""
 
@@ -85,18 +83,12 @@ def _doubted(found: SharedDiagnosis, names: list[str]) -> dict[str, str]:
 
 
 def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
-    """The strongest shared effect with its size in every recording; without one, the scores of all effects."""
-    if found.effects:
-        strongest = found.effects[0]
-        chart = partial(shared_chart, strongest, names)
-        caption = f"Parameters of {id_in_print(strongest.id)}, in all recordings together and in each; 95 % intervals."
-    elif found.candidates:
-        chart = partial(candidates_chart, found.candidates)
-        caption = "What each effect would gain with one size in all recordings (twice the log-evidence, corrected "
-        caption += "for multiple testing): left of 0 nothing."
-    else:
+    """The strongest shared effect with its size in every recording."""
+    if not found.effects:
         return None
-    return Picture("shared", caption, chart)
+    strongest = found.effects[0]
+    caption = f"Parameters of {id_in_print(strongest.id)}, in all recordings together and in each; 95 % intervals."
+    return Picture("shared", caption, partial(shared_chart, strongest, names))
 
 
 def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> str:
@@ -186,15 +178,3 @@ def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
         x = Scale(f"{name} [{unit}]", unit, includes=around_zero(value))
         panels.append(Panel(x, Scale("", names=beside), marks, title=name, height_px=ROW_PX * (len(rows) + 1)))
     return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
-
-
-def candidates_chart(candidates: Sequence[SharedCandidate]) -> Chart:
-    """A bar per effect: its score in all recordings together."""
-    place = -np.arange(1.0, len(candidates) + 1.0)
-    score = np.array([one.score for one in candidates])
-    tips = [f"{id_in_print(one.id)}: score {plain_number(one.score)}" for one in candidates]
-    bars = Bars(score, place, BAR, tips, "tried in all recordings together", "soft", is_across=True)
-    x = Scale("score", includes=around_zero(score))
-    names = tuple(id_in_print(one.id) for one in candidates)
-    marks = (bars, Level(x=0.0, name="gains from here on"))
-    return Chart((Panel(x, Scale("", names=names), marks, height_px=ROW_PX * (len(names) + 1)),))

@@ -19,9 +19,9 @@ FRAME_TOLERANCE = 0.03
 """Relative difference of parameters that is ignored: each side states them along the axes of its own fit, and
 the angle between the two frames and the first order of the mechanisms make up to 3 %."""
 
-FREE_CURVE = "curve"
-"""Variant of a drift without a mechanism: cosines over a session. Sessions of different length, or started at another
-temperature, have no comparable parameters."""
+FREE_CURVES = ("curve", "step")
+"""Variants of a drift without a mechanism: cosines over a session, a step. Those of two sessions have no comparable
+parameters."""
 
 CODE = "raw_"
 """Prefix of a parameter that states another one as an exact ADC code."""
@@ -194,7 +194,7 @@ def _would_drift(effect: AcceptedEffect, found: Diagnosis) -> bool:
 
 
 def _is_free(effect: AcceptedEffect) -> bool:
-    return effect.model.get("variant") == FREE_CURVE
+    return effect.model.get("variant") in FREE_CURVES
 
 
 def _parameters(

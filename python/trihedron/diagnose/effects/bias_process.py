@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -22,10 +23,16 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words, why_not
 from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
 from trihedron.session.noise import FEWEST_POSES
+from trihedron.session.rounding import UNIFORM
 
 MOST_M_S2, MOST_RAD_S = 0.6, 0.09
 """Largest bias change of a part while it warms up (0.06 g, 5 °/s; chambers of 90 K show as much); a larger one
 indicates a disturbed pose."""
+STEP, STEP_TIME = "step", "step_time"
+STEPS_KEPT = 4
+"""Places of a step that are fitted."""
+SEEN = 1e-3
+"""Least length of a direction of the step in the poses, beside S and b, that counts as seen."""
 COSINES = (1, 2, 3, 4)
 """Half periods of a slow curve in the session: as many bends as a fit of S and b leaves to twenty poses."""
 
@@ -55,19 +62,25 @@ class BiasProcess(Effect):
 
 
 class BiasDrift(BiasProcess):
-    """Warm-up exponential, straight line or slow curve per axis, or a walk stronger than the part's noise explains."""
+    """Warm-up exponential, straight line, slow curve or step per axis, or a walk stronger than the part's noise
+    explains."""
 
     walks = True
     typical: ClassVar[float]
     """Bias change of typical parts, SI."""
 
+    @property
+    def shows_as(self) -> int:
+        """Sensor whose bias the poses show where it drifts: either one's as a gyro's in a log of one orientation."""
+        return self.sensor
+
     def variants(self, context: Context) -> list[Variant]:
-        """Line, warm-up exponentials, and a slow curve of some cosines per axis."""
+        """Line, warm-up exponentials, a slow curve of some cosines per axis, and steps (after a shock)."""
         out = [self._along(context, lambda x: x[:, None], per_axis("drift"), "line")]
         out += [self._warm_up(context, fraction * _duration_s(context)) for fraction in WARM_UP_FRACTIONS]
         names = tuple(name for k in COSINES for name in per_axis(f"cosine{k}"))
         out.append(self._along(context, lambda x: np.cos(np.pi * np.outer(x, COSINES)), names, "curve"))
-        return out
+        return out + self._steps(context)
 
     def _warm_up(self, context: Context, tau_s: float) -> Variant:
         """An exponential with one time constant; its parameters are, per axis, the bias at the first sample above that
@@ -78,6 +91,22 @@ class BiasDrift(BiasProcess):
         return self._along(
             context, lambda x: np.exp(-x[:, None] * lasts_s / tau_s), per_axis("warm_up"), "warm-up", shape
         )
+
+    def _steps(self, context: Context) -> list[Variant]:
+        """Steps at the likeliest places between poses, chosen by the poses alone among all."""
+        times, h = context.time_s[: context.obs.n_poses], context.obs.n_poses
+        gains = _gains_of_steps(context, self.shows_as)
+        out = []
+        for k in np.argsort(-gains)[:STEPS_KEPT]:
+            at_s, begin_s = 0.5 * (times[k] + times[k + 1]), context.obs.time_s[0]
+            share = (at_s - begin_s) / _duration_s(context)
+            made = self._along(
+                context, lambda x, share=share: (x > share)[:, None].astype(np.float64), per_axis("step"), STEP,
+                {STEP_TIME: (float(at_s), "s")},
+            )  # fmt: skip
+            sigma = float(times[k + 1] - times[k]) * np.sqrt(UNIFORM)
+            out.append(replace(made, shape_sigma=sigma, n_places=(h - 1) / STEPS_KEPT))
+        return out
 
     def _along(
         self, context: Context, curves: Callable[[FloatArray], FloatArray], names: tuple[str, ...], label: str,
@@ -116,11 +145,23 @@ class BiasDrift(BiasProcess):
         return per_axis_parameters("range", size, std, self.unit), said
 
     def of_curve(
-        self, size: FloatArray, std: FloatArray, *, is_counts: bool
+        self, variant: Variant, size: FloatArray, std: FloatArray, *, is_counts: bool
     ) -> tuple[tuple[EffectParameter, ...], Words]:
-        """The same of a smooth curve in such a log."""
-        said = self.reported("static-counts", range=size) if is_counts else self.reported("static", range=size)
-        return per_axis_parameters("range", size, std, self.unit), said
+        """The same of a step or a smooth curve in such a log."""
+        parameters = per_axis_parameters("range", size, std, self.unit)
+        if variant.label != STEP:
+            said = self.reported("static-counts", range=size) if is_counts else self.reported("static", range=size)
+            return parameters, said
+        at_s, _ = variant.shape[STEP_TIME]
+        if is_counts:
+            return parameters, self.reported("step-counts", range=size, step_time=at_s)
+        return parameters, self.reported("step", range=size, step_time=at_s)
+
+    def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
+        values = {p.name: p.value for p in parameters}
+        if STEP_TIME not in values:
+            return super().statement(parameters)
+        return self.reported("step", range=[values[name] for name in per_axis(STEP)], step_time=values[STEP_TIME])
 
 
 class AccelBiasDrift(BiasDrift):
@@ -137,6 +178,23 @@ class GyroBiasDrift(BiasDrift):
     id, sensor = "gyro-bias-drift", GYRO
     confounded_with = ("gyro-bias",)
     typical = TYPICAL[1]
+
+
+def _gains_of_steps(context: Context, sensor: int) -> FloatArray:
+    """(poses - 1,) sum of squares that a step of the bias behind each pose takes off the means of the poses, beside S
+    and b. Gravity shows an accelerometer's bias along the vertical only."""
+    error, up = context.static_errors(sensor), context.fitted.state.up
+    if sensor == GYRO:
+        rows, seen, known = error.T, np.ones((len(error), 1)), np.ones((len(error), 1))
+    else:
+        rows, seen, known = np.einsum("ni,ni->n", up, error)[None], up, context.norm_columns
+    basis = np.linalg.qr(known)[0]
+    out = np.zeros(len(error) - 1)
+    for k in range(len(out)):
+        later = np.where(np.arange(len(error))[:, None] > k, seen, 0.0)
+        own = np.linalg.svd(later - basis @ (basis.T @ later), full_matrices=False)
+        out[k] = ((rows @ own[0][:, own[1] > SEEN]) ** 2).sum()
+    return out
 
 
 def _duration_s(context: Context) -> float:

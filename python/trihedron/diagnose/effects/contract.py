@@ -41,7 +41,7 @@ MIN_FALL = 15.0
 place and size."""
 MOST_NAMED = 4
 """Places of one kind that a sentence names: more do not fit a line."""
-SHAPE_NAMES = ("time_constant", "half_width", "pose", "thermometer_lag")
+SHAPE_NAMES = ("time_constant", "half_width", "pose", "thermometer_lag", "step_time")
 """Names of the shape parameters, which are nonlinear: chosen from a grid, refined at the maximum of the evidence."""
 
 
@@ -60,6 +60,8 @@ class Variant:
     label: str = ""
     shape_sigma: float = 0.0
     scale: float = 1.0
+    n_places: float = 1.0
+    """Shapes among which this one was chosen beforehand, for each that is offered."""
     part_of: tuple[Distortion, tuple[int, ...]] | None = None
     """Columns of several variants, and which of them are its own: such variants are screened together."""
 

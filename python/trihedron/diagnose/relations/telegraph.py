@@ -34,7 +34,7 @@ def telegraphs(context: Context) -> Iterator[tuple[Dependence, float]]:
 
 def _levels(context: Context, sensor: int, axis: int) -> tuple[FloatArray, float] | None:
     """State in every pose, between -1 and 1, and what it gains in log-likelihood; ``None`` with one level."""
-    error, state, obs = _static_errors(context, sensor), context.fitted.state, context.obs
+    error, state, obs = context.static_errors(sensor), context.fitted.state, context.obs
     up = state.up
     if sensor:
         assert obs.pose_rate_sigma is not None
@@ -44,21 +44,10 @@ def _levels(context: Context, sensor: int, axis: int) -> tuple[FloatArray, float
     else:
         # Gravity shows the component along the vertical only, less what S and b take of it.
         reading, seen = np.einsum("ni,ni->n", up, error), up @ context.accel_axes[:, axis]
-        known = np.column_stack([up, *(up[:, j] * up[:, k] for j in range(3) for k in range(j, 3))])
+        known = context.norm_columns
         noise = obs.norm_sigma(up @ state.accel_S)
     means = reading, seen, context.time_s[: len(error)], float(np.median(noise**2))
     return _core.telegraph_levels(_inside_poses(obs, sensor, axis), known, means)
-
-
-def _static_errors(context: Context, sensor: int) -> FloatArray:
-    """(poses, 3) what the means over the poses read beyond gravity and the effects of the hypothesis, SI, body."""
-    obs, state, distortion = context.obs, context.fitted.state, context.fitted.distortion
-    if sensor:
-        assert obs.pose_rate is not None
-        error, effects = obs.pose_rate @ state.gyro_S.T, distortion.rate
-    else:
-        error, effects = obs.pose_force @ state.accel_S.T + state.accel_b - state.gravity * state.up, distortion.force
-    return np.asarray(error if effects is None else error - effects[: len(error)] @ state.effect)
 
 
 @lru_cache(maxsize=24)

@@ -34,14 +34,17 @@ BOTH_SIDES_OF_LEVEL = (
 SHAKE = "shake the sensor about one axis at several frequencies: a delay grows with frequency, a low-pass saturates"
 
 
-def drifts(sensor: str, unit: str, walk: str, static: str = "") -> Mapping[str, str]:
-    """Bias drift from pose to pose, by its kind; in a log of one orientation ``static`` is added. There readings of
-    unknown scale stay counts."""
-    whole = f"The {sensor} bias drifts {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
+JUMPS = "changes at once at {step_time:.0f} s"
+
+
+def drifts(sensor: str, unit: str, walk: str, beside: str = "") -> Mapping[str, str]:
+    """Bias drift by its kind, ``beside`` what else a slow one may be. Readings of unknown scale in a log of one
+    orientation stay counts."""
+    whole = f"The {sensor} bias {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
     sizes = {"": f"{{range:all .2g {unit}}}", "-counts": "{range:all .3g} counts"}
     return {
-        way + of: whole.format(how=how, sizes=own) + static
-        for way, how in (("walk", walk), ("static", "smoothly"))
+        way + of: whole.format(how=how, sizes=own) + also
+        for way, how, also in (("walk", walk, beside), ("static", "drifts smoothly", beside), ("step", JUMPS, ""))
         for of, own in sizes.items()
     }
 
@@ -84,7 +87,12 @@ ACCELEROMETER = {
     "accel-bias-drift": EffectWords(
         "the accelerometer bias drifts smoothly in time; no logged channel explains it",
         LOG_TEMPERATURE,
-        drifts("accelerometer", "mm/s²", "as a random walk", " A settling support has the same effect across gravity."),
+        drifts(
+            "accelerometer",
+            "mm/s²",
+            "drifts as a random walk",
+            " A settling support has the same effect across gravity.",
+        ),
     ),
     "accel-bias-repeatability": EffectWords(
         "the accelerometer bias changes from pose to pose",
@@ -118,7 +126,7 @@ GYROSCOPE = {
     "gyro-bias-drift": EffectWords(
         "the gyro bias drifts smoothly in time; no logged channel explains it",
         LOG_TEMPERATURE,
-        drifts("gyro", "°/s", "as a random walk beyond its noise"),
+        drifts("gyro", "°/s", "drifts as a random walk beyond its noise"),
     ),
     "gyro-bias-repeatability": EffectWords(
         "the gyro bias changes from pose to pose",
