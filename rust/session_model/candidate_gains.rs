@@ -19,6 +19,8 @@ struct Look {
     side: DMatrix<f64>,
     turned: Vec<DMatrix<f64>>,
     moves: Vec<Group>,
+    /// Log-evidence of the fit there, relative to that at the first strengths.
+    alone: f64,
 }
 
 /// A fit at several strengths.
@@ -30,7 +32,8 @@ pub struct CandidateGains<'a> {
 /// Gain and estimate of a candidate.
 #[derive(Debug, Clone)]
 pub struct Seen {
-    /// Gain in log-evidence, `(scales, strengths)`; the prior sizes are a scale times those given.
+    /// Gain in log-evidence over the fit at the first strengths, `(scales, strengths)`; the prior sizes are a scale
+    /// times those given.
     pub gain: DMatrix<f64>,
     /// Its parameters at the first strengths and their best scale, one linear step from the fit.
     pub estimate: DVector<f64>,
@@ -49,6 +52,7 @@ impl<'a> CandidateGains<'a> {
             .iter()
             .map(unweighed)
             .collect::<Result<_>>()?;
+        let alone = hypothesis.at_each(strengths);
         // Other strengths show what may be hidden by the fit's: no move has little weight there.
         let gaussian = Hypothesis::of(fit, &[], &[])?.without_tails();
         let look = |(k, at): (usize, &Strengths)| {
@@ -73,6 +77,7 @@ impl<'a> CandidateGains<'a> {
                 side,
                 moves: moves.collect(),
                 turned,
+                alone: alone[k] - alone[0],
             })
         };
         Ok(Self {
@@ -126,6 +131,7 @@ impl<'a> CandidateGains<'a> {
             let imitated = look.factor.inner(&side);
             let normal = own.columns(0, k) - imitated.view((0, 0), (k, k));
             Left {
+                alone: look.alone,
                 normal: 0.5 * (&normal + normal.transpose()),
                 slope: own.column(k) - imitated.view((0, k), (k, 1)).column(0),
             }
@@ -155,6 +161,7 @@ impl<'a> CandidateGains<'a> {
 /// Columns projected orthogonally to the unknowns of the fit, at some strengths: their products, and those with the
 /// residual.
 struct Left {
+    alone: f64,
     normal: DMatrix<f64>,
     slope: DVector<f64>,
 }
@@ -163,6 +170,7 @@ impl Left {
     /// Some of the columns.
     fn of(&self, part: &[usize]) -> Self {
         Self {
+            alone: self.alone,
             normal: self.normal.select_rows(part).select_columns(part),
             slope: self.slope.select_rows(part),
         }
@@ -185,7 +193,8 @@ fn judged(left: &[Left], sizes: &DVector<f64>, scales: &[f64]) -> Result<Seen> {
             let half = Cholesky::new(inner)
                 .ok_or_else(|| Error::not_determined("a candidate's columns are not finite"))?;
             let step = half.solve(&slope);
-            gain[(s, l)] = 0.5 * slope.dot(&step) - half.l().diagonal().map(f64::ln).sum();
+            gain[(s, l)] =
+                one.alone + 0.5 * slope.dot(&step) - half.l().diagonal().map(f64::ln).sum();
             if l == 0 && first.as_ref().is_none_or(|(best, ..)| gain[(s, l)] > *best) {
                 let scaled = DMatrix::from_diagonal(&d);
                 first = Some((

@@ -204,7 +204,7 @@ impl Hypothesis {
     }
 
     /// Log-evidence at each of some strengths.
-    fn at_each(&self, strengths: &[Strengths]) -> Vec<f64> {
+    pub(super) fn at_each(&self, strengths: &[Strengths]) -> Vec<f64> {
         let one = |s: &Strengths| {
             let weighted_rows = self.weighted_rows(s);
             weighted_rows.map_or(f64::NEG_INFINITY, |weighted_rows| {

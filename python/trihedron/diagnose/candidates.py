@@ -138,8 +138,8 @@ def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float) -> list
     for first in range(0, len(offered), AT_ONCE):
         terms = [term for effect in offered[first : first + AT_ONCE] for term in terms_of(model, effect, price)]
         looks = zip(terms, model.gains(terms, PRIOR_SCALES), strict=True)
-        # Low noise shows most: with the strengths refitted none gains more than at the best of these.
-        may = [(term, look) for term, look in looks if 2.0 * float(look.gain.max()) - term.cost > -NEAR]
+        # Refitted strengths raise the best of these by less than a full fit does.
+        may = [(term, look) for term, look in looks if 2.0 * float(look.gain.max()) - term.cost > -WORTH_FITTING]
         kept = _ahead([*kept, *((term, _can_be(model, term, look), look.gain) for term, look in may)])
     scales = [PRIOR_SCALES[int(gain.max(axis=1).argmax())] for *_, gain in kept]
     return [term.scaled(scale) for (term, *_), scale in zip(kept, scales, strict=True)]

@@ -79,8 +79,9 @@ class AddedTerms:
 
 @dataclass(frozen=True, eq=False)
 class AtStrengths:
-    """Result of adding columns at fixed noise strengths: ``gain`` (prior scales, strengths) in log-evidence; ``value``
-    (k,) and ``covariance`` (k, k) at the first strengths and their best scale."""
+    """Result of adding columns at fixed noise strengths: ``gain`` (prior scales, strengths) in log-evidence over the
+    hypothesis without them at its own; ``value`` (k,) and ``covariance`` (k, k) at the first strengths and their best
+    scale."""
 
     gain: FloatArray
     value: FloatArray
@@ -126,7 +127,8 @@ class Hypothesis:
         return [AddedTerms(*one) for one in found]
 
     def gains(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AtStrengths]:
-        """Gain of each of some terms at the strengths found and at ``ELSEWHERE``, prior sizes times ``scales``."""
+        """Gain over this hypothesis of each of some terms added, at the strengths found and at ``ELSEWHERE``, prior
+        sizes times ``scales``."""
         wholes: dict[int, tuple[Distortion, FloatArray, list[list[int]], list[int]]] = {}
         for k, term in enumerate(terms):
             whole, part = term.variant.part_of or (term.distortion, range(term.distortion.n_parameters))

@@ -224,7 +224,8 @@ impl SessionFit {
         )
     }
 
-    /// Gain of every candidate in log-evidence at each of the `strengths`, its prior sizes times each of the `scales`:
+    /// Gain of every candidate in log-evidence at each of the `strengths`, over the fit without it at the first of
+    /// them, its prior sizes times each of the `scales`:
     /// `(scales, strengths)`; its parameters and their covariance at the first strengths and their best scale. With
     /// `parts` of each candidate (indices of columns), the gain of each part instead, candidate after candidate.
     #[pyo3(signature = (candidates, scales, strengths, parts=None))]
