@@ -81,7 +81,7 @@ def test_the_demonstration_writes_its_files_and_never_over_others(tmp_path, monk
     assert main(["demo", "--seed", "3"]) == 0
     out = capsys.readouterr().out
     assert "Compare with the truth" in out
-    assert "The drawn flaw" in out
+    assert "The drawn effect" in out
     names = {"session.csv", "second-session.csv", "calibration.json", "report.html", "verification.html", "truth.json"}
     names |= {"unit.csv", "simulation.toml", "improved.toml", "disagreement.html", "sealed.json"}
     assert {p.name for p in Path("trihedron-demo").iterdir()} == names

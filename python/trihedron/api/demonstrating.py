@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from trihedron.api.calibrating import calibrate
-from trihedron.api.reading import read, segment
+from trihedron.api.reading import read
 from trihedron.api.verifying import verify
 from trihedron.arrays import FloatArray, rms_of, sigmas_of
 from trihedron.errors import InputError
@@ -20,7 +18,7 @@ from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
-from trihedron.records.results import CalibrationResult, VerificationResult
+from trihedron.records.results import CalibrationResult, DiagnosisResult, VerificationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.demonstration import demonstration_report, with_files
 from trihedron.report.document import Document
@@ -30,48 +28,30 @@ from trihedron.sensor_model import reframing
 from trihedron.simulate import Environment, Scenario, hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
-if TYPE_CHECKING:
-    from trihedron.api.disagreeing import Disagreement
-
-
 LATITUDE_DEG = 59.94
 SEED = 2020
 COUNTS_PER_G = 16384.0
 """Sensitivity that the data sheet of the simulated accelerometer states."""
 
 
-@dataclass(frozen=True, eq=False)
-class Demonstration:
-    """Results of the demonstration's first act and the folder of its files."""
-
-    result: CalibrationResult
-    verification: VerificationResult
-    comparison: Comparison
-    uncalibrated_rms_m_s2: float
-    files: tuple[tuple[Path, str], ...]
-    document: Document
-
-
 def demo(
     folder: str | os.PathLike[str] = "trihedron-demo", *, seed: int = 0, overwrite: bool = False
-) -> tuple[Demonstration, Disagreement]:
+) -> tuple[CalibrationResult, DiagnosisResult]:
     """Two acts, simulated: calibrate and compare with the truth; then a simulation that a log contradicts.
-
-    ``print`` of either act shows its report.
 
     Parameters
     ----------
     folder : path
         Where logs, calibrations and reports go.
     seed : int
-        Draws the unit and the flaw of the second act.
+        Draws the unit and the effect of the second act.
     overwrite : bool
         Replace files of a folder that exists.
 
     Returns
     -------
-    (Demonstration, Disagreement)
-        The two acts.
+    (CalibrationResult, DiagnosisResult)
+        Of the first act and of the second; ``print`` shows the report of each.
 
     Raises
     ------
@@ -87,45 +67,40 @@ def demo(
         raise InputError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
     from trihedron.api.disagreeing import disagree
 
-    first = demonstrate(target, overwrite=overwrite)
-    return first, disagree(target, seed, overwrite=overwrite)
+    return demonstrate(target, overwrite=overwrite)[0], disagree(target, seed, overwrite=overwrite)[0]
 
 
-def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], None] | None = None) -> Demonstration:
+def demonstrate(
+    folder: Path, *, overwrite: bool = False, say: Callable[[str], None] | None = None
+) -> tuple[CalibrationResult, VerificationResult, Document]:
     """Simulate two sessions of one sensor, calibrate by the first, verify on the second, write everything to
-    ``folder``.
+    ``folder``; the document compares with the truth.
 
     The logs are written as CSV and read back like any log: only the final comparison uses the truth.
     """
     notify = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
+    log, stored, other = (folder / name for name in ("session.csv", "calibration.json", "second-session.csv"))
     notify("simulating two sessions of one sensor")
-    first = _session(folder / "session.csv", 0, overwrite)
-    second = _session(folder / "second-session.csv", 1, overwrite)
+    first, second = _session(log, 0, overwrite), _session(other, 1, overwrite)
     truth = truth_of_the_day(_scenario(0), SEED)
     notify("calibrating by the first")
     result = calibrate(first, latitude_deg=LATITUDE_DEG)
     notify("verifying on the second")
-    segments = segment(second)
-    judged = verify(result, second, segments=segments, latitude_deg=LATITUDE_DEG)
-    comparison = compare_with_truth(result.calibration, truth)
-    before = _uncalibrated_rms(segments, judged.verification.gravity_m_s2)
-    files = _files(folder)
-    document = demonstration_report(
-        result.calibration, result.segments, first, judged.verification, comparison, before, LATITUDE_DEG, files
-    )
+    judged = verify(result, second, latitude_deg=LATITUDE_DEG)
     notify("writing reports")
-    write_calibration(result.calibration, folder / "calibration.json", overwrite=overwrite)
+    write_calibration(result.calibration, stored, overwrite=overwrite)
     write_whole(folder / "truth.json", _truth_text(truth), overwrite=overwrite)
-    log, stored, other = (folder / name for name in ("session.csv", "calibration.json", "second-session.csv"))
     pages = (
         ("report.html", calibration_report(result.calibration, result.segments, first)),
-        ("verification.html", verification_report(judged.verification, segments, second)),
+        ("verification.html", verification_report(judged.verification, judged.segments, second)),
     )
     for name, page in pages:
         page = with_files(page, LOG=log, FILE=stored, OTHER_LOG=other)
         write_whole(folder / name, to_html(page), overwrite=overwrite)
-    return Demonstration(result, judged, comparison, before, files, document)
+    comparison = compare_with_truth(result.calibration, truth)
+    before = _uncalibrated_rms(judged.segments, judged.verification.gravity_m_s2)
+    return result, judged, demonstration_report(comparison, before, judged.verification.norm_rms, folder)
 
 
 def compare_with_truth(calibration: Calibration, truth: Truth) -> Comparison:
@@ -203,17 +178,6 @@ def _uncalibrated_rms(segments: Segments, gravity_m_s2: float) -> float:
     assert segments.accelerometer_mean is not None
     norm = np.linalg.norm(segments.accelerometer_mean * (STANDARD_GRAVITY_M_S2 / COUNTS_PER_G), axis=1)
     return rms_of(norm - gravity_m_s2)
-
-
-def _files(folder: Path) -> tuple[tuple[Path, str], ...]:
-    return (
-        (folder / "session.csv", "the log that was calibrated: time and raw counts"),
-        (folder / "calibration.json", "the calibration with its covariance and findings"),
-        (folder / "report.html", "the report, with figures; open it in a browser"),
-        (folder / "second-session.csv", "another session of the same sensor"),
-        (folder / "verification.html", "the calibration tested on it"),
-        (folder / "truth.json", "what the simulated sensor is really made of"),
-    )
 
 
 def _truth_text(truth: Truth) -> str:

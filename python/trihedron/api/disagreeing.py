@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,6 @@ from trihedron.report.page import to_html
 from trihedron.simulate import (
     Environment,
     Scenario,
-    diagnosed_sizes,
     hand_session,
     profile_by_name,
     simulate,
@@ -61,7 +60,7 @@ def _signed(rng: np.random.Generator, size: float) -> tuple[float, float, float]
 
 
 # Sizes of the data sheets of consumer parts; ids as `trihedron diagnose` names them.
-FLAWS: dict[str, Draw] = {
+EFFECTS: dict[str, Draw] = {
     "accel-quadratic": lambda rng: {"k2": _signed(rng, 2.5e-4)},
     "accel-cubic": lambda rng: {"k3": tuple(abs(v) for v in _signed(rng, 4e-5))},
     "accel-scale-asymmetry": lambda rng: {"asymmetry": _signed(rng, 1.5e-3)},
@@ -72,27 +71,16 @@ FLAWS: dict[str, Draw] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Disagreement:
-    """Results of the second act: the diagnosis, that of the improved simulation, and the sealed answer."""
-
-    seed: int
-    found: DiagnosisResult
-    improved: DiagnosisResult
-    sealed: Mapping[str, Any]
-    document: Document
-
-
 def disagree(
     folder: Path, seed: int, *, overwrite: bool = False, say: Callable[[str], None] | None = None
-) -> Disagreement:
-    """Draw a unit with one flaw, seal the answer, diagnose its log against a plain simulation, then open the seal.
+) -> tuple[DiagnosisResult, Document]:
+    """Draw a unit with one effect, seal the answer, diagnose its log against a plain simulation, then open the seal.
 
     The log is written and read back like any log; the file with the answer is opened after both verdicts.
     """
     notify = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
-    notify("drawing a unit with one flaw, and sealing which")
+    notify("drawing a unit with one effect, and sealing which")
     gravity = normal_gravity(LATITUDE_DEG)
     scenario, sealed = _drawn(seed, gravity)
     write_whole(folder / "sealed.json", json.dumps(plain(sealed), indent=2) + "\n", overwrite=overwrite)
@@ -111,9 +99,7 @@ def disagree(
     write_whole(folder / "disagreement.html", to_html(page), overwrite=overwrite)
     notify("opening the seal")
     opened = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))
-    sizes = dict(diagnosed_sizes([e.to_dict() for e in found.own_effects])[0])
-    document = disagreement_report(found, improved, opened, sizes, folder, seed)
-    return Disagreement(seed, found, improved, opened, document)
+    return found, disagreement_report(found, improved, opened, folder)
 
 
 def _drawn(seed: int, gravity: float) -> tuple[Scenario, dict[str, Any]]:
@@ -126,6 +112,6 @@ def _drawn(seed: int, gravity: float) -> tuple[Scenario, dict[str, Any]]:
     gyroscope = replace(gyroscope, S=rows)  # type: ignore[arg-type]
     motion = hand_session(24, layout=int(rng.integers(1, 10_000)))
     scenario = Scenario(motion, "unit", accelerometer, gyroscope, profile.clock, Environment(gravity_m_s2=gravity))
-    flaw = str(rng.choice(sorted(FLAWS)))
-    size = FLAWS[flaw](rng)
-    return with_effect(scenario, flaw, **size), {"unit": number, "effect": flaw, "size": size, "seed": seed}
+    effect = str(rng.choice(sorted(EFFECTS)))
+    size = EFFECTS[effect](rng)
+    return with_effect(scenario, effect, **size), {"unit": number, "effect": effect, "size": size, "seed": seed}

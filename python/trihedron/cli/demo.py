@@ -28,14 +28,14 @@ def demo(folder: Path | None = None, seed: int | None = None, force: bool = Fals
     from trihedron.api.demonstrating import demonstrate
     from trihedron.report.text import to_text
 
-    done = demonstrate(target, overwrite=force, say=step)
-    put(to_text(done.document, style=style()))
+    result, verified, document = demonstrate(target, overwrite=force, say=step)
+    put(to_text(document, style=style()))
     from trihedron.api.disagreeing import disagree
 
     drawn = secrets.randbelow(1_000_000) if seed is None else seed
     typer.echo("")
-    put(to_text(disagree(target, drawn, overwrite=force, say=step).document, style=style()))
-    leave((*done.result.findings, *done.verification.findings))
+    put(to_text(disagree(target, drawn, overwrite=force, say=step)[1], style=style()))
+    leave((*result.findings, *verified.findings))
 
 
 def _free_folder() -> Path:
