@@ -131,10 +131,6 @@ def test_a_place_in_a_sentence_takes_si_and_says_its_unit_its_number_and_its_bra
     assert filled(place, {"x": value}, {}) == said
 
 
-def test_a_command_in_a_sentence_is_a_whole_call_in_python_or_stays_a_command():
-    texts = (text for entry in ENTRIES for text in (entry.seen, entry.cause, entry.action))
-    commands = {one for text in texts for one in re.findall(r"`trihedron [^`{}]*`", text)}
-    assert len(commands) > 5
-    for command in commands:
-        said = in_python(command)
-        assert said == command or ast.parse(said.strip("`"))
+def test_in_python_a_sentence_names_parameters_and_a_command_stays_a_command():
+    said = in_python("Give --latitude DEG (and --height M), or run `trihedron calibrate LOG --latitude DEG`.")
+    assert said == "Give latitude_deg (and height_m), or run `trihedron calibrate LOG --latitude DEG`."

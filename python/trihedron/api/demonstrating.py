@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+
 import numpy as np
 
 from trihedron.api.calibrating import calibrate

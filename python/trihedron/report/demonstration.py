@@ -51,7 +51,7 @@ def demonstration_report(comparison: Comparison, before_m_s2: float, after_m_s2:
     )
     return Document(
         title="A complete session, on a simulated sensor",
-        subtitle="A 16-bit MEMS part, set down by hand in 24 poses. All but the last comparison is computed from the log.",
+        subtitle="A 16-bit MEMS part, set down by hand in 24 poses; only this comparison uses the truth.",
         verdict=f"Gravity error in static poses of a session that the calibration has not seen: "
         f"{in_mm_s2(before_m_s2)} rms before, {in_mm_s2(after_m_s2)} after. {within} of {n} parameters lie within 2 σ "
         "of the truth.",
