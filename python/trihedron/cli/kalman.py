@@ -49,5 +49,5 @@ def kalman(
         )
     document = kalman_report(result.outcome, result.calibration)
     machine = partial(kalman_record, result.outcome, result.calibration)
-    more = "Every pose: --full; convergence, innovations and residuals drawn: --report FILE.html."
+    more = "Every pose: --full; convergence and innovations drawn: --report FILE.html."
     results.emit_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)

@@ -1,11 +1,11 @@
-"""Report of a calibration by Kalman filter: constants by every method, convergence, innovations, residual."""
+"""Report of a calibration by Kalman filter: constants by every method, convergence, innovations."""
 
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import AXES, XYZ, FloatArray, rms_of
+from trihedron.arrays import AXES, FloatArray, rms_of
 from trihedron.files.calibration import calibration_document
 from trihedron.records import (
     CONSTANT_NAMES,
@@ -18,27 +18,18 @@ from trihedron.records import (
 )
 from trihedron.records.published import BY_FILTER
 from trihedron.report.calibration import FRAMES, parameter_table, scale_headlines
-from trihedron.report.document import WITHIN, Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import WITHIN, Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.kalman_charts import (
-    convergence_chart,
-    drift_chart,
-    innovations_chart,
-    norm_convergence_chart,
-    residual_chart,
-)
+from trihedron.report.kalman_charts import convergence_chart, drift_chart, innovations_chart, norm_convergence_chart
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, unit_in_print
 from trihedron.units import mm_s2_from_m_s2
 
 TEST = "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
-CLOSE = 0.01
-"""Convergence: every sensitivity stays within this fraction of the axis' sensitivity from its last value."""
 _INNOVATIONS = """Normalised innovations squared (NIS), innovation² / predicted variance: every pose that is judged, \
 their running mean, and where 99 % of such means lie when the noise model is right."""
 _AS_PREDICTED = "the innovations are as large and as white as the noise model predicts"
 _SMALLER = "the innovations are smaller than the noise model predicts, the uncertainties too wide"
 _IN_SAMPLE = ", in sample without redundancy: no test of the fit"
-_CORRECTED = "Corrected minus reference specific force of every pose."
 
 
 def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> Document:
@@ -124,14 +115,10 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
         caption += "its last value."
         pictures.append(Picture(f"convergence-{name}", caption, partial(convergence_chart, axis, raw_unit)))
     drift = "Bias drift that the filter saw: while it ran, and smoothed with all readings, with 1 σ bands."
-    pictures += [
-        Picture("drift", drift, partial(drift_chart, outcome.axes, raw_unit)),
-        Picture("residual", _CORRECTED, partial(residual_chart, outcome.residual_m_s2)),
-    ]
+    pictures.append(Picture("drift", drift, partial(drift_chart, outcome.axes, raw_unit)))
     return [
         Section("Result", (Facts(facts), *(_constants_table(axis, raw_unit) for axis in outcome.axes))),
         Section("Calibration", (parameter_table("accelerometer", outcome.accelerometer),)),
-        Section("Convergence", (_arrival_table(outcome),)),
         Section("Poses", (_pose_table(outcome),)),
         Section("Figures", tuple(pictures)),
     ]
@@ -148,14 +135,10 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         ),
     )
     convergence = "S and b after every pose, with the 3 σ band around their last values."
-    residual = "Gravity error in every static pose: length of the corrected reading minus |g|."
-    pictures: tuple[Block, ...] = (
-        Picture("convergence", convergence, partial(norm_convergence_chart, outcome)),
-        Picture("residual", residual, partial(residual_chart, outcome.residual_m_s2[:, None])),
-    )
+    picture = Picture("convergence", convergence, partial(norm_convergence_chart, outcome))
     return [
         Section("Result", (Facts(facts), parameter_table("accelerometer", outcome.accelerometer))),
-        Section("Figures", pictures),
+        Section("Figures", (picture,)),
     ]
 
 
@@ -185,21 +168,6 @@ def _consistency_table(seen: list[tuple[str, Consistency, int]]) -> Table:
     caption = "NIS: innovations squared over their predicted variance; Ljung-Box test of whiteness. The first poses "
     caption += "only start the filter, which predicts nothing yet"
     return Table(head, rows, caption)
-
-
-def arrival(constants: FloatArray) -> int:
-    """Pose, numbered from 1, from which on the sensitivities of ``constants`` (n, 4) stay within ``CLOSE``."""
-    away = np.abs(constants[:, :3] - constants[-1, :3]).max(axis=1) > CLOSE * np.linalg.norm(constants[-1, :3])
-    return int(np.flatnonzero(away)[-1]) + 2 if np.any(away) else 1
-
-
-def _arrival_table(outcome: KalmanCalibration) -> Table | Paragraph:
-    methods = [track.method for track in outcome.axes[0].tracks]
-    rows = tuple(
-        (method.capitalize(), *(str(arrival(axis.track(method).constants)) for axis in outcome.axes))
-        for method in methods
-    )
-    return Table(("", *XYZ), rows, "Poses until all sensitivities stay within 1 % of their last values")
 
 
 def _pose_table(outcome: KalmanCalibration) -> Table:

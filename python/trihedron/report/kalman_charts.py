@@ -1,4 +1,4 @@
-"""Charts of a calibration by Kalman filter: convergence, innovations, slow noise, residual."""
+"""Charts of a calibration by Kalman filter: convergence, innovations, slow noise."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,6 @@ import numpy as np
 from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.probability import chdtri
 from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
-from trihedron.report.calibration_charts import mm_s2
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.report.numbers import one_of, unit_in_print
@@ -113,16 +112,3 @@ def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
         y = Scale(f"{XYZ[result.axis]} [{unit}]", unit)
         panels.append(Panel(Scale("pose", whole=True, limits=(1, max(2, len(pose)))), y, marks, height_px=140))
     return Chart(tuple(panels), is_linked=True)
-
-
-def residual_chart(residual: FloatArray) -> Chart:
-    """Residual (n, 3) of the components or (n, 1) of the norm, m/s²."""
-    pose = np.arange(1, len(residual) + 1, dtype=np.float64)
-    marks: list[Level | Points] = [Level(y=0.0)]
-    for k in range(residual.shape[1]):
-        name = f"f{AXES[k]}" if residual.shape[1] == 3 else "|f| − |g|"
-        values = mm_s2(residual[:, k])
-        tips = [said(f"pose {p}, {name}", float(v), "mm/s²") for p, v in enumerate(values, start=1)]
-        marks.append(Points(pose, values, tips, None, name, AXIS_COLOURS[k]))
-    x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
-    return Chart((Panel(x, Scale("residual [mm/s²]", "mm/s²"), tuple(marks)),))

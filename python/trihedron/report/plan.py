@@ -1,19 +1,14 @@
 """Report of a planned experiment: uncertainties to expect."""
 
 import math
-from functools import partial
-
-import numpy as np
 
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan
-from trihedron.report.chart import Chart, Line, Panel, Points, Scale
-from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Document, Facts, Headline, Paragraph, Section, Table
 from trihedron.report.numbers import MINUS, plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
 ALL_NUMBERS = 9
 """Number of parameters of a triad: scales, angles and biases."""
-FEWEST_SETS = 2
 LEAST_WORTH = 0.01
 """Uncertainty of a scale from which an experiment adds little: data sheets state 1 to 3 % without one."""
 LITTLE = " A data sheet states 1 to 3 % without an experiment: "
@@ -44,7 +39,6 @@ def plan_report(plan: ExperimentPlan) -> Document:
         is_trustworthy=True,
         stated_level="usable" if remedy else "good",
         headlines=tuple(_headlines(plan, best)),
-        lead=_picture(plan.poses),
         next_step=_next_step(plan),
         sections=(
             Section(
@@ -101,32 +95,6 @@ def _headlines(plan: ExperimentPlan, best: PosePlan | None) -> list[Headline]:
     found = [] if best is None else [("accelerometer scale", best.scale, f", {best.n_poses} poses")]
     found.append(("gyro scale by turns", plan.turns.scale, ""))
     return [Headline(what, plain_number(100.0 * scale, 2), "%", f"1 σ, worst axis{n}") for what, scale, n in found]
-
-
-def _picture(poses: tuple[PosePlan, ...]) -> Picture | None:
-    known = [pose for pose in poses if pose.rank == ALL_NUMBERS]
-    if len(known) < FEWEST_SETS:
-        return None
-    caption = "Largest standard uncertainty (1 σ) of the accelerometer against the number of poses; sets that leave a "
-    caption += "parameter undetermined are not drawn. → Where the curve is flat, more poses are not worth their time."
-    return Picture("poses", caption, partial(_poses_chart, known))
-
-
-def _poses_chart(known: list[PosePlan]) -> Chart:
-    """Uncertainty of scale, angle and bias over the number of poses."""
-    n = np.array([pose.n_poses for pose in known], dtype=np.float64)
-    panels = []
-    for name, unit, values in (
-        ("scale", "%", [100.0 * pose.scale for pose in known]),
-        ("axis angle", "mrad", [mrad_from_radians(pose.angle) for pose in known]),
-        ("bias", "mm/s²", [mm_s2_from_m_s2(pose.bias) for pose in known]),
-    ):
-        y = np.array(values)
-        tips = [f"{pose.name}: {plain_number(v, 2)} {unit}" for pose, v in zip(known, values, strict=True)]
-        marks = (Line(n, y, "", "c1"), Points(n, y, tips, None, "a set of poses", "c1"))
-        x = Scale("poses", whole=True, includes=(0.0,))
-        panels.append(Panel(x, Scale(f"σ of {name} [{unit}]", unit, includes=(0.0,)), marks, height_px=200))
-    return Chart(tuple(panels), columns=3)
 
 
 def _moves(moves: tuple[MovePlan, ...]) -> tuple[Table, Paragraph]:

@@ -1,15 +1,10 @@
 """Report of a ranking of calibrations."""
 
 import math
-from functools import partial
 
-import numpy as np
-
-from trihedron.arrays import FloatArray
 from trihedron.records import Severity
 from trihedron.records.ranking import Ranked, Ranking, Suspicion
-from trihedron.report.chart import Chart, Colour, Line, Mark, Panel, Points, Scale
-from trihedron.report.document import Document, Facts, Picture, Section, Table
+from trihedron.report.document import Document, Facts, Section, Table
 from trihedron.report.findings import by_weight, findings_block
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
 from trihedron.report.verification import (
@@ -22,8 +17,6 @@ from trihedron.report.verification import (
 )
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
-ROW_PX = 34
-JUDGED: dict[str, Colour] = {"verified": "c1", "imprecise": "c3", "doubtful": "soft", "rejected": "accent"}
 MISTAKES = {
     "bias-sign": "the bias has the wrong sign",
     "bias-order": "the bias belongs to the other side of the matrix",
@@ -49,8 +42,6 @@ def ranking_report(ranking: Ranking) -> Document:
     verdict += f". {verified_in_words(v)}"
     if best.is_rejected:
         verdict = f"None of these calibrations fits this log: of the best, {best.name}, {said_of(best)}."
-    caption = "Errors of each calibration on this log, the best first; the order is by both errors, each pose and move "
-    caption += "weighted by its uncertainty."
     judged_on = f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
     facts = (("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"), ("judged on", judged_on))
     sections = [
@@ -66,7 +57,6 @@ def ranking_report(ranking: Ranking) -> Document:
         is_trustworthy=not best.is_rejected,
         sections=tuple(sections),
         headlines=headlines_of(v),
-        lead=Picture("order", caption, partial(_ranking_chart, ranking)),
         next_step="Calibrate again: none of these fits this log." if best.is_rejected else use_in_words(v, best.name),
     )
 
@@ -157,31 +147,3 @@ def ranking_record(ranking: Ranking) -> dict[str, object]:
             for one in ranking.candidates
         ],
     }
-
-
-def _ranking_chart(ranking: Ranking) -> Chart:
-    """A row per calibration, the best first: gravity error in static poses, and tilt error after a rotation."""
-    found = ranking.candidates
-    gravity = np.array([(one.verification.norm_rms, *one.norm_interval) for one in found])
-    tilt = np.array([(one.verification.angle_rms_deg, *one.angle_interval) for one in found])
-    panels = [_panel(ranking, "gravity error", "mm/s²", mm_s2_from_m_s2(1.0) * gravity)]
-    if np.isfinite(tilt).any():
-        panels.append(_panel(ranking, "tilt error", "°", tilt))
-    return Chart(tuple(panels), columns=len(panels))
-
-
-def _panel(ranking: Ranking, what: str, unit: str, errors: FloatArray) -> Panel:
-    """``errors`` (n, 3): the rms of each calibration and both ends of its interval."""
-    names = tuple(one.name for one in ranking.candidates)
-    place = -np.arange(1.0, len(names) + 1.0)
-    judged = np.array([_judged(one) for one in ranking.candidates])
-    # Bootstrap intervals are not symmetric: drawn as one line with gaps between rows.
-    ends = np.column_stack([errors[:, 1:], np.full(len(names), np.nan)]).ravel()
-    marks: list[Mark] = [Line(ends, np.repeat(place, 3), "95 % interval", "soft")]
-    for word, colour in JUDGED.items():
-        part = judged == word
-        if part.any():
-            tips = [f"{names[i]}: {plain_number(errors[i, 0])} {unit}, {word}" for i in np.flatnonzero(part)]
-            marks.append(Points(errors[part, 0], place[part], tips, None, word, colour))
-    x = Scale(f"{what} [{unit}], rms", unit, includes=(0.0,))
-    return Panel(x, Scale("", names=names), tuple(marks), title=what, height_px=ROW_PX * (len(names) + 1))
