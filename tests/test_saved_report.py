@@ -21,7 +21,7 @@ from trihedron.records.domains import DOMAINS
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_pictures import uncalibrated_error
-from trihedron.report.chart import Bars, Chart, Level, Line, Matrix, Note, Panel, Points, Scale, Span, Sphere
+from trihedron.report.chart import Bars, Chart, Level, Line, Note, Panel, Points, Scale, Span, Sphere
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import _path
@@ -48,7 +48,7 @@ def chart():
     )  # fmt: skip
     panel = Panel(Scale("x [s]", "s", limits=(0.0, 4.0)), Scale("y", names=("one", "two")), marks)
     sphere = Sphere("errors", np.eye(3), x, 3.0, ["a", "b", "c"])
-    return Chart((panel, sphere, Matrix("r", ("a", "b"), np.eye(2))))
+    return Chart((panel, sphere))
 
 
 def document():

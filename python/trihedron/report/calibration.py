@@ -12,7 +12,6 @@ from trihedron.report.calibration_charts import correlations, excluded_moves, st
 from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables, undetermined
 from trihedron.report.calibration_pictures import (
     before_words,
-    correlation_picture,
     figure_blocks,
     lead_picture,
     uncalibrated_error,
@@ -289,9 +288,6 @@ def _certainty(calibration: Calibration) -> list[Block]:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))
         blocks.append(Facts(tuple(rows)))
-    picture = correlation_picture(calibration)
-    if picture is not None:
-        blocks.append(picture)
     strong, n = strong_correlations(calibration), len(correlations(calibration)[0])
     if strong:
         caption = f"Correlations above 0.5; the other {n * (n - 1) // 2 - len(strong)} pairs lie below"

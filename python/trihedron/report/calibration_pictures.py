@@ -1,31 +1,27 @@
-"""The pictures of a calibration: before and after, residuals by pose, time and orientation, correlations."""
+"""The pictures of a calibration: before and after, residuals by pose and orientation."""
 
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray, rms_of
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.report.calibration_charts import (
-    LIMIT_SIGMAS,
-    correlations,
     mm_s2,
     move_chart,
     residual_chart,
     sphere_chart,
 )
 from trihedron.report.calibration_fit import direction
-from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Mark, Matrix, Panel, Points, Scale, Sphere
+from trihedron.report.chart import Chart, Level, Mark, Panel, Points, Scale, Sphere
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.numbers import how_many, plain_number
 from trihedron.report.segments import pose_lines, signals_picture
 from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit, acceleration_to_si
-
-FEWEST_NAMES = 2
 
 
 def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture | None:
@@ -118,11 +114,6 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
     blocks: list[Block] = []
     quality = calibration.accelerometer.quality
     means = None if segments is None else segments.accelerometer_mean
-    if segments is not None and recording is not None:
-        chart = time_chart(calibration, segments, recording)
-        if chart is not None:
-            caption = "Residuals of the fit over time, against 3 σ of noise alone: drift would show as a slope."
-            blocks.append(Picture("time", caption, lambda: chart))
     if means is not None:
         if quality is not None and len(means) == len(quality.residual):
             blocks.append(orientation_picture(calibration.accelerometer, means, _unseen(quality)))
@@ -157,55 +148,3 @@ def orientation_chart(sensor: SensorCalibration, means: FloatArray, error: Float
     ]
     title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
     return Chart((Sphere(title, directions_of(force), values, limit, tips),), legend=False)
-
-
-def time_chart(calibration: Calibration, segments: Segments, recording: Recording) -> Chart | None:
-    """Residuals over time: gravity error of the poses, and tilt error after every rotation."""
-    panels = []
-    limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
-    quality = calibration.accelerometer.quality
-    if quality is not None and len(quality.residual) == segments.n_poses:
-        y = Scale("|f| − |g|  [mm/s²]", "mm/s²")
-        panels.append((y, _over_time(segments.time_mid_s, quality.residual[:, None], quality.sigma, "pose", ("",))))
-    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
-    if moved is not None and moved.residual.ndim > 1 and len(moved.residual) == len(segments.moves):
-        last = recording.n_samples - 1
-        middle = np.array(
-            [0.5 * (recording.time_s[m.start] + recording.time_s[min(m.stop, last)]) for m in segments.moves]
-        )
-        sigma = np.sqrt(np.mean(moved.sigma**2, axis=1))
-        y = Scale("gravity after a rotation, predicted − measured  [mm/s²]", "mm/s²")
-        panels.append((y, _over_time(middle, moved.residual, sigma, "move", XYZ)))
-    if not panels:
-        return None
-    x = Scale("time [s]", "s", limits=limits)
-    return Chart(tuple(Panel(x, y, marks, height_px=180) for y, marks in panels), is_linked=True)
-
-
-def _over_time(
-    time_s: FloatArray, residual: FloatArray, sigma: FloatArray, kind: str, names: tuple[str, ...]
-) -> tuple[Mark, ...]:
-    """Dots at ``time_s`` (n,) of ``residual`` (n, k) with bars of ± 3 ``sigma`` (n,), SI."""
-    limit, gap = LIMIT_SIGMAS * mm_s2(np.abs(sigma)), np.full(len(time_s), np.nan)
-    x, y = (np.column_stack(columns).ravel() for columns in ((time_s, time_s, gap), (-limit, limit, gap)))
-    marks: list[Mark] = [Level(y=0.0), Line(x, y, "3 σ of noise alone", "shade")]
-    for k, name in enumerate(names):
-        values = mm_s2(residual[:, k])
-        tips = [
-            said(f"{kind} {n}{', ' + name if name else ''}, {t:.1f} s", v, "mm/s²")
-            for n, (t, v) in enumerate(zip(time_s, values, strict=True), 1)
-        ]
-        colour = AXIS_COLOURS[k] if name else "accent"
-        marks.append(Points(time_s, values, tips, None, name or "norm in a pose", colour))
-    return tuple(marks)
-
-
-def correlation_picture(calibration: Calibration) -> Picture | None:
-    """Correlations of the free parameters of both sensors."""
-    names, r = correlations(calibration)
-    if len(names) < FEWEST_NAMES:
-        return None
-    short = tuple(name.replace("accel ", "a ").replace("gyro ", "w ") for name in names)
-    caption = "Correlations of the free parameters (a: accelerometer, w: gyroscope): orange positive, blue negative, "
-    caption += "full colour at ± 1."
-    return Picture("correlations", caption, lambda: Chart((Matrix("correlations", short, r),), legend=False))

@@ -162,20 +162,11 @@ class Sphere:
     said: Sequence[str]
 
 
-@dataclass(frozen=True, eq=False)
-class Matrix:
-    """Correlations ``values`` (n, n) of the parameters ``names``, as cells shaded by their size."""
-
-    title: str
-    names: tuple[str, ...]
-    values: FloatArray
-
-
 @dataclass(frozen=True)
 class Chart:
     """Panels under one legend. ``columns`` side by side on a wide page; linked panels zoom along ``x`` together."""
 
-    panels: tuple[Panel | Disc | Sphere | Matrix, ...]
+    panels: tuple[Panel | Disc | Sphere, ...]
     columns: int = 1
     is_linked: bool = False
     legend: bool = True

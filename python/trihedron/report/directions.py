@@ -1,4 +1,4 @@
-"""Panels without axes: directions on a disc or a rotatable sphere, correlations as a triangle of cells."""
+"""Panels without axes: directions on a disc or a rotatable sphere."""
 
 import json
 import math
@@ -6,13 +6,8 @@ from html import escape
 
 import numpy as np
 
-from trihedron.report.chart import Disc, Matrix, Sphere
+from trihedron.report.chart import Disc, Sphere
 
-CELL = 10
-NAMES = 62
-"""Width for the names; a cell has a width of ten."""
-SEEN = 0.05
-"""Correlation below which a cell is empty."""
 _RADIUS = 100.0
 
 
@@ -63,29 +58,4 @@ def drawn_sphere(sphere: Sphere, caption: str) -> str:
     return (
         f'<div class="sphere"><div class="ptitle">{escape(sphere.title)}</div>'
         f'<canvas role="img" tabindex="0" aria-label="{escape(about)}" data-points="{data}"></canvas></div>'
-    )
-
-
-def drawn_matrix(matrix: Matrix, caption: str) -> str:
-    """A cell per pair, with the same order of rows and columns; names beside the rows and at the end of columns."""
-    n = len(matrix.names)
-    cells, words = [], []
-    for i, name in enumerate(matrix.names):
-        words.append(f'<text class="row" x="-3" y="{CELL * i + 7.5}">{escape(name)}</text>')
-        words.append(
-            f'<text class="col" transform="translate({CELL * i + 3} {CELL * i - 2})rotate(-45)">{escape(name)}</text>'
-        )
-        for j in range(i):
-            r = float(matrix.values[i, j])
-            if abs(r) >= SEEN:
-                side = "pos" if r > 0.0 else "neg"
-                cells.append(
-                    f'<path class="cell {side}" fill-opacity="{abs(r):.2f}" d="M{CELL * j} {CELL * i}h9v9h-9z"/>'
-                )
-    frame = "".join(f"M0 {CELL * i + 9.5}H{CELL * i + 9}" for i in range(n))
-    box = f"{-NAMES} -34 {CELL * n + NAMES + 30} {CELL * n + 38}"
-    return (
-        f'<div class="matrix"><div class="ptitle">{escape(matrix.title)}</div>'
-        f'<svg role="img" aria-label="{escape(f"{matrix.title}: {caption}")}" viewBox="{box}">'
-        f'<path class="rim" d="{frame}"/>{"".join(cells)}{"".join(words)}</svg></div>'
     )

@@ -15,7 +15,6 @@ from trihedron.report.chart import (
     Level,
     Line,
     Mark,
-    Matrix,
     Note,
     Panel,
     Points,
@@ -23,7 +22,7 @@ from trihedron.report.chart import (
     Sphere,
     limits_of,
 )
-from trihedron.report.directions import drawn_disc, drawn_matrix, drawn_sphere
+from trihedron.report.directions import drawn_disc, drawn_sphere
 from trihedron.report.layout import UNITS, Places, apart, ticks
 from trihedron.report.numbers import plain_number, with_sigma
 
@@ -50,12 +49,12 @@ def drawn(chart: Chart, caption: str) -> str:
     return "".join(parts)
 
 
-def _one(panel: Panel | Disc | Sphere | Matrix, caption: str, around: tuple[int, bool]) -> str:
+def _one(panel: Panel | Disc | Sphere, caption: str, around: tuple[int, bool]) -> str:
     if isinstance(panel, Disc):
         return drawn_disc(panel, caption)
     if isinstance(panel, Sphere):
         return drawn_sphere(panel, caption)
-    return drawn_matrix(panel, caption) if isinstance(panel, Matrix) else _panel(panel, caption, around)
+    return _panel(panel, caption, around)
 
 
 def _surroundings(chart: Chart) -> tuple[int, bool]:

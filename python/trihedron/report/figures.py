@@ -24,7 +24,6 @@ from trihedron.report.chart import (
     Level,
     Line,
     Mark,
-    Matrix,
     Note,
     Panel,
     Points,
@@ -90,7 +89,7 @@ def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
 
 
 def draw_chart(chart: Callable[[], Chart]) -> Figure:
-    """Every panel of a chart: lines, points with uncertainties, bands and levels; discs, spheres, correlations."""
+    """Every panel of a chart: lines, points with uncertainties, bands and levels; discs, spheres."""
     laid_out = chart()
     columns, panels = laid_out.columns, laid_out.panels
     rows = -(-len(panels) // columns)
@@ -128,14 +127,11 @@ def _named(axes: Sequence[Axes]) -> dict[str, Artist]:
     return {name: mark for axis in axes for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
 
 
-def _draw_any(axis: Axes, panel: Panel | Disc | Sphere | Matrix) -> None:
+def _draw_any(axis: Axes, panel: Panel | Disc | Sphere) -> None:
     if isinstance(panel, Panel):
         _draw_panel(axis, panel)
         return
     axis.set_title(panel.title, fontsize=8.5, loc="left")
-    if isinstance(panel, Matrix):
-        _draw_matrix(axis, panel)
-        return
     _rim(axis)
     if isinstance(panel, Disc):
         for x, y, label, _, kind in panel.points:
@@ -162,15 +158,6 @@ def _rim(axis: Axes) -> None:
         axis.plot([0.0, x / 1.15], [0.0, y / 1.15], color=COLOURS["grey"], linewidth=0.6, zorder=0)
     axis.set_aspect("equal")
     axis.set_axis_off()
-
-
-def _draw_matrix(axis: Axes, matrix: Matrix) -> None:
-    """The lower triangle of correlations: orange positive, blue negative."""
-    names, n = matrix.names, len(matrix.names)
-    lower = np.where(np.tri(n, k=-1, dtype=bool), matrix.values, np.nan)
-    axis.imshow(lower, cmap="PuOr_r", vmin=-1.0, vmax=1.0)
-    axis.set_xticks(range(n), names, rotation=90, fontsize=6)
-    axis.set_yticks(range(n), names, fontsize=6)
 
 
 def _draw_panel(axis: Axes, panel: Panel) -> None:

@@ -229,13 +229,6 @@
   for (const canvas of document.querySelectorAll(".sphere canvas")) new Sphere(canvas);
   const labels = (node, text) => { node.addEventListener("pointermove", (e) => show(text, e)); node.addEventListener("pointerleave", hide); };
   for (const node of document.querySelectorAll(".pose")) labels(node, node.dataset.t);
-  for (const matrix of document.querySelectorAll(".matrix")) {
-    const names = [...matrix.querySelectorAll(".row")].map((row) => row.textContent);
-    for (const cell of matrix.querySelectorAll(".cell")) {
-      const [j, i] = cell.getAttribute("d").match(/\d+/g).map((v) => v / 10), sign = cell.classList.contains("pos") ? "+" : MINUS;
-      labels(cell, `${names[i]} and ${names[j]}: ${sign}${cell.getAttribute("fill-opacity")}`);
-    }
-  }
 
   /* Tables: a click on a head sorts by it, the third click brings back the order of the file. */
   const key = (text) => {
