@@ -221,18 +221,21 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     head = ("", *(f"{raw}′_{j}{times}" for j in AXES), f"b [{unit}]")
     value = np.column_stack([scale * sensor.S, sensor.b])
     sigma = np.column_stack([scale * sensor.sigma_S, sensor.sigma_b])
-    rows = tuple(
+    rows = [
         row
         for i in range(3)
         for row in (
             (f"{true}_{AXES[i]} =", *each_with_sigma(value[i], sigma[i])),
             ("", *(_percent(v, s) for v, s in zip(value[i], sigma[i], strict=True))),
         )
-    )
+    ]
     of_S = "S dimensionless" if sensor.raw_unit == sensor.si_unit else f"S in {unit} per {one_of(sensor.raw_unit)}"
     caption = f"{name.capitalize()}: {true} = S {raw}′ + b, with the reading {raw}′ in {unit_in_print(sensor.raw_unit)}"
-    caption += f", {of_S}; value ± standard uncertainty (1 σ), and σ in % of the value where below 100 %"
-    return Table(head, rows, caption)
+    caption += f", {of_S}"
+    if not np.any(sigma):
+        return Table(head, tuple(rows[::2]), caption)
+    caption += "; value ± standard uncertainty (1 σ), and σ in % of the value where below 100 %"
+    return Table(head, tuple(rows), caption)
 
 
 def _percent(value: float, sigma: float) -> str:

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import AXES
-from trihedron.records import Finding, FindingCode, Recording, Severity, TermName, Truth
-from trihedron.report.calibration import SYMBOLS
+from trihedron.records import Finding, FindingCode, Recording, SensorCalibration, Severity, TermName, Truth
+from trihedron.report.calibration import parameter_table
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, likely, verdict_of
 from trihedron.report.noise_units import unit_of
-from trihedron.report.numbers import duration, how_many, one_of, plain_number, unit_in_print
+from trihedron.report.numbers import duration, how_many, plain_number
 from trihedron.report.segments import truth_chart
 from trihedron.units import degrees_from_radians
 
@@ -110,21 +109,11 @@ def in_rows(value: Any) -> str:
 
 def _linear(recording: Recording, truth: Truth) -> tuple[Table, ...]:
     """The true S and b of both sensors, in the layout of a calibration report."""
-    out = []
-    for name, S, b, raw, unit in (
-        ("accelerometer", truth.accelerometer_S, truth.accelerometer_b, recording.accelerometer_unit.value, "m/s²"),
-        ("gyroscope", truth.gyroscope_S, truth.gyroscope_b, recording.gyroscope_unit.value, "rad/s"),
-    ):
-        true, read = SYMBOLS[name]
-        rows = tuple(
-            (f"{true}_{axis} =", *(plain_number(float(v), 6) for v in S[i]), plain_number(float(b[i]), 6))
-            for i, axis in enumerate(AXES)
-        )
-        of_S = "S dimensionless" if unit_in_print(raw) == unit else f"S in {unit} per {one_of(raw)}"
-        head = ("", *(f"{read}′_{axis}" for axis in AXES), f"b [{unit}]")
-        caption = f"{name.capitalize()}: {true} = S {read}′ + b, {of_S}; its further effects stand above"
-        out.append(Table(head, rows, caption))
-    return tuple(out)
+    exact = np.zeros((12, 12))
+    units = recording.accelerometer_unit.value, recording.gyroscope_unit.value
+    accel = SensorCalibration(truth.accelerometer_S, truth.accelerometer_b, exact, units[0], "m/s^2", "simulated")
+    gyro = SensorCalibration(truth.gyroscope_S, truth.gyroscope_b, exact, units[1], "rad/s", "simulated")
+    return parameter_table("accelerometer", accel), parameter_table("gyroscope", gyro)
 
 
 def _noise(truth: Truth) -> tuple[Block, ...]:
