@@ -17,72 +17,15 @@ Level = Literal["good", "usable", "bad"]
 _WRONG = ("usable", "bad")
 EMPTY = ("", "–")
 """Cells without a value."""
-CONSEQUENCE = (
-    FindingCode.SAME_RECORDING,
-    FindingCode.SENSORS_EXCHANGED,
-    FindingCode.GRAVITY_MISSING,
-    FindingCode.STUCK_VALUES,
-    FindingCode.UNIT_CONTRADICTED,
-    FindingCode.SCALE_NOT_NOMINAL,
-    FindingCode.TURNTABLE,
-    FindingCode.COLUMNS_ASSUMED,
-    FindingCode.NOT_FIT,
-    FindingCode.NOT_TESTED,
-    FindingCode.SEVERAL_DEVICES,
-    FindingCode.POSES_VIBRATE,
-    FindingCode.GYROSCOPE_LEFT_OUT,
-    FindingCode.RATE_ASSUMED,
-    FindingCode.WORSE_THAN_UNCALIBRATED,
-    FindingCode.SESSION_LEFT_OUT,
-    FindingCode.CALIBRATION_DOUBTED,
-    FindingCode.STATIC_FORCE,
-    FindingCode.EFFECT_NOT_APPLIED,
-    FindingCode.FILTER_NOISE_OTHER_STATIC,
-    FindingCode.FILTER_NOISE_FOLLOWED,
-    FindingCode.FILTER_NOISE_INCONSISTENT,
-    FindingCode.FILTER_NOISE_UNCERTAIN,
-    FindingCode.FILTER_NOISE_BELOW_QUIETEST,
-    FindingCode.TEMPERATURE_DRIVEN,
-    FindingCode.LOG_TURNED,
-    FindingCode.TWO_LEVELS,
-    FindingCode.LOG_DRIFT,
-    FindingCode.REFERENCE_NOT_INDEPENDENT,
-    FindingCode.REFERENCE_APART,
-    FindingCode.LEFT_HANDED,
-    FindingCode.TURN_NOT_A_MULTIPLE,
-    FindingCode.TABLE_TILT,
-    FindingCode.EFFECTS_MODELLED,
-    FindingCode.POSE_AT_RANGE_LIMIT,
-    FindingCode.OUTLIER_POSE,
-    FindingCode.OUTLIER_MOVE,
-    FindingCode.INNOVATIONS_TOO_LARGE,
-    FindingCode.RESIDUAL_ABOVE_NOISE,
-    FindingCode.HELD_OUT_WORSE,
-    FindingCode.STATIC_RATE_ABOVE_NOISE,
-    FindingCode.NOT_OBSERVABLE,
-    FindingCode.WEAKLY_OBSERVABLE,
-    FindingCode.FEW_POSES,
-    FindingCode.GYRO_G_SENSITIVITY,
-    FindingCode.BIAS_DRIFT,
-    FindingCode.GYRO_BIAS_DRIFT,
-    FindingCode.NONLINEAR_RESIDUAL,
-    FindingCode.GRAVITY_DEFAULTED,
-)
-"""Findings about the whole result: what was read wrongly, the gravest, what an option mends; the others follow."""
 WITHIN = "Usable where these errors are acceptable: "
 """Verdict with warnings, before the errors."""
 USE_IT = " Use it: "
 """Beginning of the last step, which the test before it repeats: left out behind the action of a warning."""
 _COMMAND = re.compile(r"`trihedron (\w+) LOG")
 """A command on the same log; where an action and the first step have the same one, they are one step."""
-IN_A_NEW_LOG = (FindingCode.NOT_OBSERVABLE, FindingCode.WEAKLY_OBSERVABLE)
-"""Findings about motion that the log lacks: a result of this log remains without it."""
-CONFIRMED = (FindingCode.TIME_UNIT_DETECTED,)
-"""Serious findings about what may be read rightly: the next step holds where it is."""
-INSTEAD = (*IN_A_NEW_LOG, FindingCode.SEVERAL_DEVICES)
-"""Findings whose action takes the place of the use of the result."""
 THEN_RUN = {
-    **dict.fromkeys(IN_A_NEW_LOG, "Then record a new log and run `... NEW_LOG`."),
+    FindingCode.NOT_OBSERVABLE: "Then record a new log and run `... NEW_LOG`.",
+    FindingCode.WEAKLY_OBSERVABLE: "Then record a new log and run `... NEW_LOG`.",
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
     FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
     "calibration.json LOG -o corrected.csv`, and give corrected.csv to `trihedron noise`.",
@@ -98,12 +41,6 @@ def action_in_words(finding: Finding) -> str:
 def begins_with(step: str, action: str) -> bool:
     """Whether a next step states an action, whose commands may be filled there."""
     return step[1:].startswith(action[1:].partition("`")[0])
-
-
-def concerns_whole(finding: Finding) -> bool:
-    """Whether a finding is about the whole result: one of ``CONSEQUENCE``, short stuck intervals aside."""
-    is_stretch = finding.code is FindingCode.STUCK_VALUES and finding.severity is not Severity.SERIOUS
-    return finding.code in CONSEQUENCE and not is_stretch
 
 
 @dataclass(frozen=True)
@@ -222,38 +159,17 @@ class Document:
 
     @property
     def what_next(self) -> str:
-        """The action of a serious finding, or one in a new log; that of a warning about the whole result before
-        ``next_step``, gravity that was not given after all else that is wrong."""
-        first = self.foremost
-        place = next((one for one in self.findings if one.code is FindingCode.GRAVITY_DEFAULTED), None)
-        is_last = place is not first or self.stated_level in _WRONG
-        if place is None or not is_last or first is None or first.severity is Severity.SERIOUS:
-            return self._begun_by(first)
-        if not self.next_step or place.action in self.next_step:
-            return self._begun_by(None if place is first else first)
-        return f"{self._begun_by(None if place is first else first)} {place.action}"
-
-    def _begun_by(self, first: Finding | None) -> str:
-        then = self.next_step
+        """The action of a serious finding; that of a warning before ``next_step``."""
+        first, then = self.foremost, self.next_step
         if first is None or not first.action or begins_with(then, first.action) or first.action in then:
             return then
         action = action_in_words(first)
-        if action.startswith("If ") and then and "; else " not in action:
-            return f"{action} Otherwise: {then[:1].lower()}{then[1:]}"
-        if first.code in CONFIRMED and then:
-            return f"{action} If it is right: {then[:1].lower()}{then[1:]}"
-        if first.severity is Severity.SERIOUS or first.code in INSTEAD:
-            # An option that was missing is no remedy of what else is serious.
-            others = (one for one in self.findings if one.severity is Severity.SERIOUS and one.code is not first.code)
-            second = next(others, None) if first.code is FindingCode.RATE_ASSUMED else None
-            return action if second is None or not second.action else f"{action} Then: {action_in_words(second)}"
-        if not concerns_whole(first):
-            return then
         own, first_step = _COMMAND.search(action), _COMMAND.search(then.partition(".")[0])
-        if own is not None and first_step is not None and own[1] == first_step[1]:
+        is_same = own is not None and first_step is not None and own[1] == first_step[1]
+        if first.severity is Severity.SERIOUS or is_same or not then:
             return action
         then = then.partition(USE_IT)[0]
-        return f"{action} Then: {then[:1].lower()}{then[1:]}" if then else action
+        return f"{action} Then: {then[:1].lower()}{then[1:]}"
 
     @property
     def foremost(self) -> Finding | None:

@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from trihedron.records import Finding, Severity
-from trihedron.report.document import CONSEQUENCE, Document, FindingList, Paragraph, concerns_whole
+from trihedron.records import Finding, FindingCode, Severity
+from trihedron.report.document import Document, FindingList, Paragraph
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import IN_FULL, warnings_in_print
 from trihedron.report.numbers import MINUS, capital, listed
@@ -20,7 +20,7 @@ _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.
 
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
-    """Findings, gravest first; within a severity by consequence, then in the order of the stages; equal ones merged."""
+    """Findings, gravest first, within a severity in the order of the stages; equal ones merged."""
     ordered = by_weight(findings)
     sentences = tuple(replace(one, seen=capital(one.seen), cause=capital(one.cause)) for one in ordered)
     return FindingList(sentences) if sentences else Paragraph("None.")
@@ -28,17 +28,19 @@ def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
 
 def by_weight(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Findings, equal ones merged, gravest first."""
-    return tuple(sorted(combined(findings), key=_weight))
+    return tuple(
+        sorted(combined(findings), key=lambda f: (_ORDER[f.severity], f.code is FindingCode.GRAVITY_DEFAULTED))
+    )
+
+
+def _weight(finding: Finding) -> tuple[int, bool]:
+    # Gravity that was not given comes after all else that is wrong.
+    return _ORDER[finding.severity], finding.code is FindingCode.GRAVITY_DEFAULTED
 
 
 def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The serious findings, the one of the verdict first."""
     return tuple(one for one in by_weight(findings) if one.severity is Severity.SERIOUS)
-
-
-def _weight(finding: Finding) -> tuple[int, int]:
-    place = CONSEQUENCE.index(finding.code) if concerns_whole(finding) else len(CONSEQUENCE)
-    return _ORDER[finding.severity], place
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
