@@ -1,9 +1,9 @@
 """Names of effects, parameters, domains and axes in print."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
-from trihedron.report.numbers import first_of, listed
+from trihedron.report.numbers import listed
 
 LETTERS = 2
 """Most letters of a name that consists of axes alone, as ``xy``."""
@@ -59,14 +59,6 @@ FINDINGS = {
     "turn-unchecked": "axis with a single turn",
 }
 """Warnings in words, where the code is no phrase of the field."""
-IN_FULL = (
-    *("calibration-doubted", "few-poses", "left-handed", "pose-at-range-limit", "pose-unsteady", "poses-vibrate"),
-    *("clipping", "innovations-too-large", "reference-apart", "scale-not-nominal", "static-force", "turntable"),
-)
-"""Warnings whose first clause says in a few words which axis or value it is."""
-PLACE = re.compile(r"(?:^|\. )(?:pose|move) (\d+(?: at [\d.]+ s)?)\b", re.IGNORECASE)
-"""A sentence about one pose or move begins with its number."""
-SENSOR = re.compile(r"\b(?:the|and) (accelerometer|gyro)", re.IGNORECASE)
 
 
 def axis_in_print(name: str) -> str:
@@ -84,23 +76,6 @@ def id_in_print(name: str) -> str:
 
 def finding_in_print(code: str) -> str:
     return FINDINGS.get(code) or id_in_print(code)
-
-
-def warnings_in_print(code: str, sentences: Sequence[str], seen: Sequence[str], n: int) -> str:
-    """Warnings of one code, ``sentences`` their first clauses of ``seen``, by name, with the sensors, poses or moves
-    that they name, or else their number ``n``: ``clipping (accelerometer and gyro)``, ``outlier poses 3, 7``; one of
-    ``IN_FULL`` by its sentence."""
-    if code in IN_FULL and len(sentences) == 1:
-        said = sentences[0]
-        return said[:1].lower() + said[1:] if said[1:2].islower() else said
-    name = finding_in_print(code)
-    named = {found.lower() for one in sentences for found in SENSOR.findall(one)}
-    if named and not any(one in name for one in named):
-        return f"{name} ({listed(sorted(named))})"
-    places = [found for one in seen for found in PLACE.findall(one)]
-    if places and name.endswith((" pose", " move")):
-        return f"{name}{'s' if len(places) > 1 else ''} {first_of(places)}"
-    return name if n == 1 else f"{name} ({n})"
 
 
 def label_of(group: str, name: str) -> str:

@@ -1,13 +1,14 @@
 """Findings in words: the closed catalogue of sentences; findings in reading order, merged, and their verdict."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.document import Document, FindingList, Paragraph
 from trihedron.report.findings.wording import opening
-from trihedron.report.names import IN_FULL, warnings_in_print
+from trihedron.report.names import finding_in_print
 from trihedron.report.numbers import MINUS, capital, listed
 
 STATED = "Stated above."
@@ -46,23 +47,15 @@ def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
     """``bad`` with the first clause of the gravest finding and its cause; ``usable`` with the warnings by name; or
     ``good``."""
-    serious = serious_ones(findings)
-    warned: dict[str, list[Finding]] = {}
-    for one in by_weight(findings):
-        if one.severity is Severity.WARNING:
-            warned.setdefault(one.code.value, []).append(one)
+    found = by_weight(findings)
+    serious = [one for one in found if one.severity is Severity.SERIOUS]
+    warned = Counter(finding_in_print(one.code.value) for one in found if one.severity is Severity.WARNING)
     if serious:
         return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
     if not warned:
         return good
-    named = []
-    # Sentences stand behind names.
-    for code, same in sorted(warned.items(), key=lambda one: one[0] in IN_FULL):
-        # Findings of one code with several causes are about one thing: a time gap, and the move that it is in.
-        n = 1 if len({one.cause for one in same}) > 1 else len(same)
-        named.append(warnings_in_print(code, [opening(one.seen) for one in same], [one.seen for one in same], n))
-    warnings = "a warning" if len(named) == 1 and len(next(iter(warned.values()))) == 1 else "warnings"
-    return f"{usable}, with {warnings}: {listed(named)}."
+    named = [name if n == 1 else f"{name} ({n})" for name, n in warned.items()]
+    return f"{usable}, with {'a warning' if warned.total() == 1 else 'warnings'}: {listed(named)}."
 
 
 def likely(cause: str) -> str:
