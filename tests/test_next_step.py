@@ -90,16 +90,6 @@ def test_the_command_that_a_simulation_of_turns_suggests_gives_a_calibration_wit
     assert "OK: no problems found." in capsys.readouterr().out
 
 
-def test_motion_that_is_missing_is_recorded_in_a_new_log_for_the_same_command_which_replaces_its_file():
-    now.begin(("calibrate", "my log.csv", "--rate", "50", "--json", "r.json", "-o", "cal.json"))
-    now.note_log(LogSource(log=Path("my log.csv"), rate=50.0))
-    assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG --rate 50 -o cal.json --force`"
-    now.begin(("calibrate", "a.csv", "b.csv", "--rate", "50"))
-    for name in ("a.csv", "b.csv"):
-        now.note_log(LogSource(log=Path(name), rate=50.0))
-    assert filled("`... NEW_LOG`") == "`trihedron calibrate NEW_LOG_1 NEW_LOG_2 --rate 50`"
-
-
 def test_a_command_names_all_logs_and_repeats_no_output():
     words = ("noise", "a.csv", "--json=r.json", "--report", "r.html", "--force", "--rate=9")
     assert now.again(words) == "trihedron noise a.csv --rate=9"
@@ -168,9 +158,3 @@ def test_a_calibration_less_certain_than_that_of_the_log_is_replaced_though_its_
     for findings, is_kept in (((), True), ((imprecise,), False)):
         found = SimpleNamespace(verdict="consistent", parameters=(agrees,), findings=findings)
         assert next_step_in_words(found, "cal.json").startswith("Keep using cal.json") == is_kept
-
-
-def test_the_commands_after_another_reading_have_it_too():
-    said = filled("Read it with --columns ax=3,ay=2. Then: `... -o FILE`, `trihedron apply calibration.json LOG`.")
-    assert said.count("--columns ax=3,ay=2") == 3
-    assert "--columns" not in filled("`trihedron check LOG`")

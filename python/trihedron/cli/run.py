@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timezone
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,17 +18,12 @@ if TYPE_CHECKING:
 
 _COMMAND = re.compile(r"`(?:trihedron |\.\.\. )[^`]+`")
 _NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output", "--updated", "--improved")
-_SHOWN = ("--json", "--report", "--full", "--force")
-_WRITTEN = ("-o", "--output", "--updated", "--improved")
-_ON_A_NEW_LOG = "`... NEW_LOG`"
 _OF_ITS_COMMAND = ("--alpha", "--by", "--labels", "--frame")
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
 _NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--))")
 """A command with one of several logs by its name: this place is also its own."""
-_READ_WITH = re.compile(r"Read it with (--columns \S+)[.;] ")
-"""A next step that begins with another reading: its other commands have that option too, and the last one counts."""
 UNSTORED = "calibration.json"
 LONG = 100
 """Characters of a command from which another option is named without it."""
@@ -57,7 +51,6 @@ class _Run:
     place: str = ""
     beside: str = ""
     file: str = ""
-    read_with: str = ""
     excluded: tuple[str, ...] = ()
 
 
@@ -151,15 +144,13 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
     if not _now().file:
         what_next = what_next.replace("-o FILE --force", "-o FILE")
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
-            is_long = stored_by == "..." and len(again(_now().typed)) > LONG and not _READ_WITH.match(what_next)
+            is_long = stored_by == "..." and len(again(_now().typed)) > LONG
             option = f"{_extended(document.findings)}-o {UNSTORED}"
             is_added = f": add `{option}` to this `{(*_now().typed, '')[0]}` command"
             how = is_added if is_long else f" (`{stored_by} {option}`)"
             said = f"Store {'S and b' if len(_now().logs) > 1 else 'it'}{how}. {said}"
             what_next = replace(document, next_step=said).what_next
     sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
-    advised = _READ_WITH.match(what_next)
-    _now().read_with = "" if advised is None else advised[1]
     return replace(document, next_step=with_commands(what_next), sections=sections)
 
 
@@ -188,11 +179,9 @@ def _with_actions(block: Block) -> Block:
 
 
 def _filled(command: str) -> str:
-    if command == _ON_A_NEW_LOG:
-        return f"`{_on_a_new_log()}`" if _now().typed else command
     verb = command.strip("`").split(" ")[1]
     more = (_now().beside, _now().place) if verb in _WITH_PLACE else ()
-    log = " ".join(filter(None, (_now().log, _now().read_with, *more)))
+    log = " ".join(filter(None, (_now().log, *more)))
     given = [word for word in _now().typed if word not in _now().excluded]
     if verb in _WITH_PLACE and _NAMES_A_LOG.search(command):
         named = shlex.split(command.strip("`"))[2:]
@@ -204,26 +193,9 @@ def _filled(command: str) -> str:
     same = (
         again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_ITS_COMMAND).split()[2:])
     )
-    same += f" {_now().read_with}" if _now().read_with else ""
     same += f" {UNKNOWN_PLACE}" if _now().place == UNKNOWN_PLACE else ""
     words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
     return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
-
-
-def _on_a_new_log() -> str:
-    """The command as typed, with its output, on other logs in place of those that were read."""
-    if _now().typed[0] == "report":
-        return "trihedron calibrate NEW_LOG"  # a calibration file: saved results have their commands
-    new: dict[str, str] = {}
-    for k, words in enumerate(_now().logs, start=1):
-        which = f"_{k}" if len(_now().logs) > 1 else ""
-        after = dict(pairwise(("LOG" if words[0].startswith("--") else "--log", *words)))
-        names = (("--log", "NEW_LOG"), ("--accel", "NEW_ACCEL"), ("--gyro", "NEW_GYRO"))
-        new |= {after[flag]: f"{name}{which}" for flag, name in names if flag in after}
-    words = [new.get(word, word) for word in shlex.split(again(_now().typed, _SHOWN))]
-    # This run has written the files that the next one replaces.
-    is_written = any(word.partition("=")[0] in _WRITTEN for word in words)
-    return shlex.join([*words, *(["--force"] if is_written else [])])
 
 
 def again(given: Sequence[str], without: Sequence[str] = _NOT_AGAIN) -> str:

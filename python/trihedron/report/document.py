@@ -24,8 +24,8 @@ USE_IT = " Use it: "
 _COMMAND = re.compile(r"`trihedron (\w+) LOG")
 """A command on the same log; where an action and the first step have the same one, they are one step."""
 THEN_RUN = {
-    FindingCode.NOT_OBSERVABLE: "Then record a new log and run `... NEW_LOG`.",
-    FindingCode.WEAKLY_OBSERVABLE: "Then record a new log and run `... NEW_LOG`.",
+    FindingCode.NOT_OBSERVABLE: "Then record a new log and run this command on it.",
+    FindingCode.WEAKLY_OBSERVABLE: "Then record a new log and run this command on it.",
     FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
     FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
     "calibration.json LOG -o corrected.csv`, and give corrected.csv to `trihedron noise`.",
