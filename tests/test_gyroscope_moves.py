@@ -93,8 +93,8 @@ def test_a_left_handed_gyro_or_one_whose_axes_are_exchanged_is_recovered_and_rep
         (np.diag([-1, 1, 1]), np.diag([-1, 1, 1]), "both sensors"),
         (np.eye(3), np.diag([1, 1, -1]), "gyro Z turns against accelerometer Z"),
         (np.diag([-1, 1, 1]), np.eye(3), "accelerometer X points against gyro X"),
-        (SWAP, np.eye(3), "accelerometer Y and Z are exchanged"),
-        (np.eye(3), SWAP, "gyro Y and Z are exchanged"),
+        (SWAP, np.eye(3), "gyro x, y and z turn about accelerometer x, z, y"),
+        (np.eye(3), SWAP, "gyro x, y and z turn about accelerometer x, z, y"),
         (np.eye(3), np.eye(3)[:, [1, 2, 0]], "gyro x, y and z turn about accelerometer"),
     ],
 )

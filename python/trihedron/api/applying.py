@@ -128,7 +128,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     findings = (*recording.findings, *more, *doubted(known), *check_range(known, recording))
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
-        findings = (*findings, Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "calibration-has-none"))
+        findings = (*findings, Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="calibration"))
     if accelerometer is None and gyroscope is None:
         raise InputError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
     force = _corrected(accelerometer, known.accelerometer)

@@ -152,7 +152,7 @@ def _of_poses(
     # Where the poses do not determine the model, the session state starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and starts_nominal(used)):
         findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [
-            Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
+            Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="model")
         ]
         recording_used, segments_used = accelerometer_only(recording, segments)
     found = diagnose_recording(

@@ -160,9 +160,9 @@ def _both_sensors(
     if (theirs.gyroscope is None) == (recording.gyroscope is None):
         return logged, recording, segments, ()
     if recording.gyroscope is None:
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "recording-has-none")
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="recording")
         return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
-    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "simulation-has-none")
+    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="simulation")
     return logged, *accelerometer_only(recording, segments), (finding,)
 
 

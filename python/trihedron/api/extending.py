@@ -14,7 +14,7 @@ from trihedron.api.diagnosing import diagnose
 from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import InputError
-from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
+from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import not_explained
 from trihedron.records.progress import Progress
@@ -163,20 +163,14 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: Float
 
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
-    if not diagnosis.effects:
-        return Finding.of(
-            FindingCode.EFFECTS_MODELLED,
-            "none-but-disagree" if left else "none",
-            left=left,
-            n_effects=0,
-            n_domains_left=len(left),
-        )
     return Finding.of(
         FindingCode.EFFECTS_MODELLED,
-        "fitted-but-disagree" if left else "fitted",
+        severity=Severity.WARNING if left else Severity.NOTE,
         effects=[effect.id for effect in diagnosis.effects],
         statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
+        is_fitted=bool(diagnosis.effects),
         left=left,
+        is_left=bool(left),
         n_effects=len(diagnosis.effects),
         n_domains_left=len(left),
     )

@@ -151,16 +151,15 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
     for code, said in doubted.items():
         name, warning, path = said[0]
         seen = words("quoted", sentence=warning)
-        if code is FindingCode.CLIPPING:
-            yield Finding.of(
-                FindingCode.CLIPPING, "of-recordings", n=len(said), n_all=len(results), name=name, seen=seen
-            )
-        elif len(said) == 1:
-            yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "of-recording", name=name, seen=seen, path=path)
-        else:
-            yield Finding.of(
-                FindingCode.CALIBRATION_DOUBTED, "of-recordings", n=len(said), n_all=len(results), name=name, seen=seen
-            )
+        yield Finding.of(
+            FindingCode.CLIPPING if code is FindingCode.CLIPPING else FindingCode.CALIBRATION_DOUBTED,
+            "of-recordings",
+            n=len(said),
+            n_all=len(results),
+            name=name,
+            seen=seen,
+            path=path,
+        )
 
 
 def _is_other(finding: Finding, stated: set[FindingCode]) -> bool:

@@ -207,7 +207,7 @@ def _positional(table: Table, sensor: Sensor | None) -> Columns:
         return replace(found, gyroscope=(others[0], others[1], others[2]))
     if sensor == "gyroscope":
         return replace(found, accelerometer=None, gyroscope=(x, y, z))
-    assumed = () if sensor else (Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=n),)
+    assumed = () if sensor else (Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=n, is_named=False),)
     return replace(found, findings=assumed)
 
 
@@ -241,7 +241,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         triads[guess] = bare[0]
         units[guess] = name.unit_for(guess)
         if told is None:
-            notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "x-y-z"))
+            notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=3, is_named=True))
     # A program may write an empty column for a clock that it does not have.
     times = [i for i, p in enumerate(parsed) if p.role == "time" and np.isfinite(table.columns[i]).any()]
     time = max(times, key=lambda i: (parsed[i].rank, -i)) if times else None

@@ -76,24 +76,24 @@ def judge_accelerometer(
     if whole and not _is_near(norm, 1.0):
         found = AccelerationUnit.COUNTS
         if _is_near(norm, 1000.0):
-            return Judged(found, (Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", static_norm=norm),))
+            return Judged(found, (_alike(found, norm, is_whole=True),))
         return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm),))
     nearest = _of_gravity(norm)
     if nearest is not None:
         # A usual scale error makes mg and cm/s^2 indistinguishable.
         is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / _GRAVITY[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
         if is_alike:
-            return Judged(
-                nearest, (Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", static_norm=norm, unit=nearest.value),)
-            )
+            return Judged(nearest, (_alike(nearest, norm, is_whole=False),))
         told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", static_norm=norm, unit=nearest.value)
         return Judged(nearest, (told,))
     if norm < 1.0 and not whole:
         return Judged(AccelerationUnit.M_S2, (Finding.of(FindingCode.GRAVITY_MISSING, static_norm=norm),))
-    return Judged(
-        AccelerationUnit.COUNTS,
-        (Finding.of(FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity", static_norm=norm),),
-    )
+    found = Finding.of(FindingCode.UNIT_ASSUMED, "no-gravity", is_seen=not math.isnan(norm), static_norm=norm)
+    return Judged(AccelerationUnit.COUNTS, (found,))
+
+
+def _alike(unit: AccelerationUnit, norm: float, *, is_whole: bool) -> Finding:
+    return Finding.of(FindingCode.UNIT_ASSUMED, "alike", static_norm=norm, unit=unit.value, is_whole=is_whole)
 
 
 _GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}

@@ -22,7 +22,7 @@ from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
 from trihedron.read.time_column import reject_unread_time, summed_steps, with_arrivals
-from trihedron.records import Finding, FindingCode, Sampling
+from trihedron.records import Finding, FindingCode, Sampling, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
 from trihedron.records.words import Words, words
@@ -263,7 +263,14 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
     if told is not None:
         findings.append(Finding.of(FindingCode.RATE_STATED, rate_hz=rate, is_given=is_given))
     else:
-        findings.append(Finding.of(FindingCode.RATE_ASSUMED, "" if chosen.gyroscope is None else "gyro", rate_hz=rate))
+        has_gyro = chosen.gyroscope is not None
+        found = Finding.of(
+            FindingCode.RATE_ASSUMED,
+            severity=Severity.SERIOUS if has_gyro else Severity.WARNING,
+            has_gyro=has_gyro,
+            rate_hz=rate,
+        )
+        findings.append(found)
     return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
 
 
@@ -275,7 +282,7 @@ def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str
     """
     usual = usual_step(table.columns[column])
     unit = "us" if usual >= LONGEST_MTI_STEP else "100us"
-    findings.append(Finding.of(FindingCode.TIME_UNIT_DETECTED, f"sample-time-{unit}", step=usual))
+    findings.append(Finding.of(FindingCode.TIME_UNIT_DETECTED, "sample-time", step=usual, is_us=unit == "us"))
     return unit
 
 

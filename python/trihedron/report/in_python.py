@@ -31,6 +31,7 @@ _PARAMETERS = {f"--{name}": name.replace("-", "_") for name in _SAME.split()} | 
     "--extended": "trihedron.extend",
 }
 _COMMAND = re.compile(r"(`trihedron \w+[^`]*`)")
+_MAPPING = re.compile(r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?")
 Value = TypeVar("Value")
 
 
@@ -46,6 +47,7 @@ def in_python(text: str) -> str:
     if "--" not in text:
         return text
     parts = _COMMAND.split(text)
+    parts[::2] = [_MAPPING.sub(r'columns="\1\2"', part) for part in parts[::2]]
     parts[::2] = [_flag().sub(lambda found: _PARAMETERS[found[1]], part) for part in parts[::2]]
     return "".join(parts)
 

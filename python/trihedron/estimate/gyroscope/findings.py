@@ -80,23 +80,22 @@ def handedness(
             yield _turned(orientation(M))
         return
     order, against = found
-    moved, others = [i + 1 for i in range(3) if order[i] != i], [i + 1 for i in against]
+    others = [i + 1 for i in against]
     mapping = ""
     if recording is not None and len(against) in (0, 3):
         mapping = recording.mapping_with("a" if against else "g", order)
-    is_known = bool(mapping)
-    match len(moved), len(others):
-        case 0, 0:
+    match list(order) == [0, 1, 2], len(others):
+        case True, 0:
             return
-        case 0, 1:
+        case True, 1:
             yield Finding.of(FindingCode.LEFT_HANDED, "gyro-reversed", axis=others[0])
-        case 0, 2:
+        case True, 2:
             (right,) = {0, 1, 2} - set(against)
             signs = "".join("-" if (S_accelerometer[i, i] < 0.0) != (i == right) else "+" for i in range(3))
             yield Finding.of(
                 FindingCode.LEFT_HANDED, "accelerometer-reversed", axis=right + 1, axes=others, signs=signs
             )
-        case 0, 3:
+        case True, 3:
             is_stated = float(np.linalg.det(S_accelerometer)) < 0.0
             yield Finding.of(
                 FindingCode.LEFT_HANDED,
@@ -104,21 +103,14 @@ def handedness(
                 severity=Severity.SERIOUS if is_stated else Severity.WARNING,
                 is_stated=is_stated,
             )
-        case 2, 0:
-            yield Finding.of(
-                FindingCode.LEFT_HANDED, "gyro-exchanged", axes=moved, has_columns=is_known, mapping=mapping
-            )
-        case 2, 3:
-            yield Finding.of(
-                FindingCode.LEFT_HANDED, "accelerometer-exchanged", axes=moved, has_columns=is_known, mapping=mapping
-            )
         case _:
-            directions = [(i in against, order[i] + 1) for i in range(3)]
+            # All three reversed: the accelerometer's columns are exchanged.
+            directions = [(i in against and len(against) < 3, order[i] + 1) for i in range(3)]
             yield Finding.of(
                 FindingCode.LEFT_HANDED,
                 "gyro-other-axes",
                 directions=directions,
-                has_columns=is_known and not against,
+                has_columns=bool(mapping),
                 mapping=mapping,
             )
 

@@ -55,7 +55,7 @@ def _clipped(sensor: str, limits: list[Limit], place: Place, *, is_static: bool)
     numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in limits}
     return Finding.of(
         FindingCode.CLIPPING,
-        "at-rest" if is_static else "",
+        is_static=is_static,
         sensor=short(sensor),
         is_gyro=sensor == "gyroscope",
         limits=[(AXES[w.axis], w.value, w.count, len(w.runs)) for w in limits],

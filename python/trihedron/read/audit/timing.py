@@ -156,7 +156,8 @@ def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Find
     return [
         Finding.of(
             FindingCode.TIME_DUPLICATE,
-            "mended" if is_mended else "",
+            severity=Severity.NOTE if is_mended else Severity.WARNING,
+            is_mended=is_mended,
             count=len(same),
             fraction=fraction,
             where=place(int(same[0]) + 1),

@@ -67,25 +67,10 @@ _CALIBRATE = {
 
 _FORCE = "In quiet intervals the corrected |f| is {norm_m_s2:.5g} m/s²"
 _USE = {
-    (Code.GYROSCOPE_LEFT_OUT, "calibration-has-none", WARNING): Words(
-        "The gyro was excluded: the calibration contains no gyro.",
-        "It was made without gyro readings, or they did not suffice.",
-        "Calibrate both sensors in one recording.",
-    ),
-    (Code.GYROSCOPE_LEFT_OUT, "model-has-none", WARNING): Words(
-        "The gyro was excluded: the model has none.",
-        "It was made without gyro readings, or they did not suffice.",
-        "Give a calibration of both sensors.",
-    ),
-    (Code.GYROSCOPE_LEFT_OUT, "simulation-has-none", WARNING): Words(
-        "The gyro was not compared: the simulated log has none.",
-        "Only the accelerometer was simulated, or only its columns were found.",
-        "Simulate both sensors, or leave the gyro's columns out of the recording.",
-    ),
-    (Code.GYROSCOPE_LEFT_OUT, "recording-has-none", WARNING): Words(
-        "The simulated gyro was not compared: the recording has none.",
-        "Only the accelerometer was logged, or only its columns were found.",
-        "Log both sensors.",
+    (Code.GYROSCOPE_LEFT_OUT, "one-has-none", WARNING): Words(
+        "The gyro was excluded: the {which} has none.",
+        "Only the accelerometer was logged or calibrated, or only its columns were found.",
+        "Give a {which} with both sensors.",
     ),
     (Code.STATIC_FORCE, "", NOTE): Words(
         f"{_FORCE} (1 σ {{sigma_m_s2:.2g}} m/s²), which agrees with gravity ({{gravity_m_s2:.5g}} m/s²).",
@@ -162,10 +147,6 @@ _USE = {
     ),
 }
 
-_MODELLED = "The linear model alone does not reproduce this recording: {statements:&; }."
-_TAKES_OFF = (
-    "`trihedron apply` compensates the effects that belong to the sensor; S and b alone are only part of this model."
-)
 _DIAGNOSE = {
     (Code.EFFECTS_MODELLED, "stays-linear", WARNING): Words(
         "The calibration stays linear: with {effects:ids} the cross-validated error grows ({domain:ids} from "
@@ -180,27 +161,15 @@ _DIAGNOSE = {
         "Record moves that these effects do not reach; `trihedron diagnose` shows which were excluded.",
         numbers=("n_effects",),
     ),
-    (Code.EFFECTS_MODELLED, "none", NOTE): Words(
-        "The diagnosis accepted no effect: the linear model is unchanged.",
-        numbers=("left", "n_effects", "n_domains_left"),
-    ),
-    (Code.EFFECTS_MODELLED, "none-but-disagree", WARNING): Words(
-        "The diagnosis accepted no effect, and {left:ids} stay unexplained. The linear model is unchanged.",
-        "Something in this recording that no effect of the catalogue describes.",
-        "`trihedron diagnose` shows where it occurs.",
+    (Code.EFFECTS_MODELLED, "", NOTE): Words(
+        "{is_fitted:?S and b were fitted together with {effects:ids}|The diagnosis accepted no effect: the linear "
+        "model is unchanged}{is_left:?; unexplained: {left:ids}|}.",
+        "{is_fitted:?The linear model alone does not reproduce this recording: {statements:&; }.|}",
+        "{is_left:?{is_fitted:?Record again: what returns belongs to the sensor, what does not to the session."
+        "|`trihedron diagnose` shows where it occurs.}|{is_fitted:?`trihedron apply` compensates the effects that "
+        "belong to the sensor; S and b alone are only part of this model.|}}",
         numbers=("n_effects", "n_domains_left"),
-    ),
-    (Code.EFFECTS_MODELLED, "fitted", NOTE): Words(
-        "S and b were fitted together with {effects:ids}.",
-        _MODELLED,
-        _TAKES_OFF,
-        numbers=("left", "n_effects", "n_domains_left"),
-    ),
-    (Code.EFFECTS_MODELLED, "fitted-but-disagree", WARNING): Words(
-        "S and b were fitted together with {effects:ids}; unexplained: {left:ids}.",
-        _MODELLED,
-        "Record again: what returns belongs to the sensor, what does not to the session.",
-        numbers=("n_effects", "n_domains_left"),
+        or_severity=WARNING,
     ),
     (Code.BIAS_DRIFT, "", WARNING): Words(
         "The bias of the {is_gyro:?gyro|accelerometer} changed by up to {change:quantity} in the recording that was "
@@ -238,21 +207,16 @@ _MANY_RECORDINGS = {
         "This recording alone does not determine a calibration; the others are used.",
         "Run `trihedron check {path}`.",
     ),
-    (Code.CALIBRATION_DOUBTED, "of-recording", WARNING): Words(
-        "in {name} by itself {seen:clause}.",
-        "What S and b of one recording leave, the common ones leave as well; their uncertainty is widened by it.",
-        "Run `trihedron diagnose {path}`, which looks for the cause.",
-    ),
     (Code.CLIPPING, "of-recordings", WARNING): Words(
         "in {n} of {n_all} recordings {seen:clause}; these are the figures of {name}.",
         "The motion left the measuring range; clipped moves count less, or are excluded.",
-        "Turn with rates below about half the range limit, move gently, or set a wider range.",
+        "Turn with rates below about half the range limit, move gently, or set a wider range; `trihedron check {path}` "
+        "says where.",
     ),
     (Code.CALIBRATION_DOUBTED, "of-recordings", WARNING): Words(
-        "in {n} of {n_all} recordings by themselves {seen:clause}; these are the figures of {name}.",
+        "in {n} of {n_all} recordings alone {seen:clause}; these are the figures of {name}.",
         "What S and b of each recording leave, the common ones leave as well; their uncertainty is widened by it.",
-        "Run `trihedron diagnose ...`: it looks for what they share; `calibrate --extended` of one recording stores it "
-        "with S and b.",
+        "Run `trihedron diagnose {path}`, which looks for the cause.",
     ),
     (Code.CALIBRATION_DOUBTED, "others", NOTE): Words(
         "Further warnings of single recordings: {recordings:each; }.",

@@ -18,13 +18,9 @@ _TIMESTAMPS = {
     (Code.TIME_DUPLICATE, "", WARNING): Words(
         "{count} samples ({fraction:.3g %}) have the same time as the one before (first: {where}).",
         "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
-        "With samples timestamped in batches, read with --columns time=none and --rate.",
+        "{is_mended:?|With samples timestamped in batches, read with --columns time=none and --rate.}",
         numbers=("sample",),
-    ),
-    (Code.TIME_DUPLICATE, "mended", NOTE): Words(
-        "{count} samples ({fraction:.3g %}) have the same time as the one before (first: {where}).",
-        "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
-        numbers=("sample",),
+        or_severity=NOTE,
     ),
     (Code.TIME_GAP, "", WARNING): Words(
         "{count:# gap}, about {lost_samples:# sample} lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s. "
@@ -71,16 +67,14 @@ _TIMESTAMPS = {
         "A wrong --time-unit.",
         "Drop --time-unit, or give the unit in which the rate is that of the sensor.",
     ),
-    (Code.TIME_UNIT_DETECTED, "sample-time-us", NOTE): Words(
-        "SampleTimeFine increases by {step:.6g}, so it counts microseconds, as Movella DOT does."
+    (Code.TIME_UNIT_DETECTED, "sample-time", NOTE): Words(
+        "SampleTimeFine increases by {step:.6g}, so it counts {is_us:?microseconds, as Movella DOT does|100 µs, as "
+        "Xsens MTi does}.",
+        action="Give --time-unit if this is wrong.",
     ),
     (Code.TIME_UNIT_DETECTED, "sum-of-steps", NOTE): Words(
         "Column {column} contains the time since the row before; the time is their sum.",
         action="If it is something else, read with --columns time=none and --rate.",
-    ),
-    (Code.TIME_UNIT_DETECTED, "sample-time-100us", NOTE): Words(
-        "SampleTimeFine increases by {step:.6g}, so it counts 100 µs, as Xsens MTi does.",
-        action="Give --time-unit us if this is wrong.",
     ),
 }
 
@@ -104,12 +98,9 @@ _RATES = {
     (Code.RATE_ASSUMED, "", WARNING): Words(
         "The log has no time column and no rate; {rate_hz:g} Hz was assumed.",
         "Only readings were logged.",
-        "Give --rate HZ.",
-    ),
-    (Code.RATE_ASSUMED, "gyro", SERIOUS): Words(
-        "The log has no time column and no rate; {rate_hz:g} Hz was assumed.",
-        "Only readings were logged.",
-        "Give --rate HZ: gyro scale, times and noise densities depend on it; 1 % of rate is 1 % of gyro scale.",
+        "Give --rate HZ{has_gyro:?: gyro scale, times and noise densities depend on it; 1 % of rate is 1 % of gyro "
+        "scale|}.",
+        or_severity=SERIOUS,
     ),
 }
 

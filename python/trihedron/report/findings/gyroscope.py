@@ -86,17 +86,6 @@ _MOVES = {
         "accelerometer's with --axis-signs, for example --axis-signs=-++}; the calibration itself corrects the gyro's.",
         or_severity=SERIOUS,
     ),
-    (Code.LEFT_HANDED, "gyro-exchanged", WARNING): Words(
-        "gyro {axes:axes and} are exchanged against the accelerometer's axes.",
-        "their columns are in another order than stated, or their documented directions are wrong.",
-        "{has_columns:?Read it with --columns {mapping}|Name the columns in their order with --columns}; the "
-        "calibration itself corrects the gyro's.",
-    ),
-    (Code.LEFT_HANDED, "accelerometer-exchanged", WARNING): Words(
-        "accelerometer {axes:axes and} are exchanged against the gyro's axes.",
-        "their columns are in another order than stated, or their documented directions are wrong.",
-        "{has_columns:?Read it with --columns {mapping}|Name the columns in their order with --columns}.",
-    ),
     (Code.LEFT_HANDED, "gyro-other-axes", WARNING): Words(
         "gyro X, Y and Z turn about accelerometer {directions:each}.",
         "the axes of one of the two sensors are in another order, or have other signs, than stated.",

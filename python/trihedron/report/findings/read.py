@@ -4,7 +4,6 @@ from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
 _SAY_ACCEL_UNIT = "Give --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."
 _SAY_GYRO_UNIT = "Give --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
-_ALIKE = "Both look alike. The calibration differs only in its name of the raw unit."
 _SOURCE = "{is_given:?as given|by its column names}"
 _TURNING = (
     "between poses gravity rotates by {factor:.3g} (± {percent:.1g} %) times the integral of the gyro in {unit:unit} "
@@ -16,15 +15,10 @@ _CUT_OFF = "A log that was cut off, or a memory card with errors."
 _COPY_AGAIN = "Copy it again from the vehicle; gaps in time show where readings are missing."
 
 _UNITS = {
-    (Code.UNIT_ASSUMED, "counts-or-mg", WARNING): Words(
-        "The accelerometer reads whole numbers of length {static_norm:.4g} while static: counts of about 1/1000 g, or "
-        "mg; taken as counts.",
-        _ALIKE,
-        _SAY_ACCEL_UNIT,
-    ),
-    (Code.UNIT_ASSUMED, "mg-or-gal", WARNING): Words(
-        "The accelerometer reads {static_norm:.4g} while static: mg (1000) or cm/s² (981); taken as {unit:unit}.",
-        _ALIKE,
+    (Code.UNIT_ASSUMED, "alike", WARNING): Words(
+        "The accelerometer reads {is_whole:?whole numbers of length |}{static_norm:.4g} while static: {is_whole:?"
+        "counts of about 1/1000 g, or mg|mg (1000) or cm/s² (981)}; taken as {unit:unit}.",
+        "Both look alike. The calibration differs only in its name of the raw unit.",
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_DETECTED, "accelerometer-counts", NOTE): Words(
@@ -33,15 +27,9 @@ _UNITS = {
     (Code.UNIT_DETECTED, "accelerometer-static", NOTE): Words(
         "The accelerometer reads {static_norm:.4g} while static, so its unit is {unit:unit}."
     ),
-    (Code.UNIT_ASSUMED, "never-whole", WARNING): Words(
-        "The accelerometer has no interval without missing readings to determine its unit; taken as raw counts.",
-        "A raw reading of unknown scale, a log without static poses, or wrong columns.",
-        _SAY_ACCEL_UNIT,
-        numbers=("static_norm",),
-    ),
     (Code.UNIT_ASSUMED, "no-gravity", WARNING): Words(
-        "The accelerometer reads {static_norm:.4g} in its quietest intervals, which is gravity in no known unit; taken "
-        "as raw counts.",
+        "The accelerometer {is_seen:?reads {static_norm:.4g} in its quietest intervals, which is gravity in no known "
+        "unit|has no interval without missing readings to determine its unit}; taken as raw counts.",
         "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
     ),
@@ -108,14 +96,8 @@ _COLUMNS = {
         lines={"roles": "{v0} from {v1}"},
     ),
     (Code.COLUMNS_ASSUMED, "accelerometer", WARNING): Words(
-        "The {n_columns} columns have no names and were taken as an accelerometer.",
-        "A log without a header; where its poses all read the same, one of a gyroscope.",
-        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4; a gyro's log goes with --gyro, beside "
-        "--accel.",
-        or_severity=SERIOUS,
-    ),
-    (Code.COLUMNS_ASSUMED, "x-y-z", WARNING): Words(
-        "Columns x y z do not say which sensor they are and were taken as an accelerometer.",
+        "The {n_columns} columns {is_named:?x y z do not say which sensor they are|have no names}; they were taken as "
+        "an accelerometer.",
         "A log without a header; where its poses all read the same, one of a gyroscope.",
         "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4; a gyro's log goes with --gyro, beside "
         "--accel.",

@@ -2,7 +2,6 @@
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
 
-_LIMIT = "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# interval})"
 ENTRIES = {
     (Code.DEVICES_INTERLEAVED, "", SERIOUS): Words(
         "Rows alternate between the readings of {n} devices, and no column identifies them.",
@@ -79,20 +78,14 @@ ENTRIES = {
         lines={"axes": "{v0:axis}: LSB {v1:.4g}, noise {v2:.2g}"},
     ),
     (Code.CLIPPING, "", WARNING): Words(
-        "The {sensor} is clipped: {limits:each}; first at {where}.",
-        "The motion left the measuring range.",
-        "{is_gyro:?Turn with rates below about half the range limit, or set a wider range; angles integrated over "
-        "clipped moves are too small|Move more gently, or set a wider range}.",
+        "The {sensor} {is_static:?reads its range limit while static|is clipped}: {limits:each}; first at {where}.",
+        "{is_static:?The range ends below {is_gyro:?the bias|1 g plus the bias} of that axis, or the channel is stuck|"
+        "The motion left the measuring range}.",
+        "{is_static:?If the axis keeps that value in {is_gyro:?motion|other poses} too, it is stuck: check the sensor "
+        "and its wiring; else set a wider range|{is_gyro:?Turn with rates below about half the range limit, or set a "
+        "wider range; angles integrated over clipped moves are too small|Move more gently, or set a wider range}}.",
         numbers=("count", "sample"),
-        lines={"limits": _LIMIT},
-    ),
-    (Code.CLIPPING, "at-rest", WARNING): Words(
-        "The {sensor} reads its range limit while static: {limits:each}; first at {where}.",
-        "The range ends below {is_gyro:?the bias|1 g plus the bias} of that axis, or the channel is stuck.",
-        "If the axis keeps that value in {is_gyro:?motion|other poses} too, it is stuck: check the sensor and its "
-        "wiring; else set a wider range.",
-        numbers=("count", "sample"),
-        lines={"limits": _LIMIT},
+        lines={"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# interval})"},
     ),
     (Code.RAW_LSB, "", NOTE): Words(
         "The {sensor}'s readings in {unit:unit} are multiples of a count (LSB {steps:each} {unit:unit}; {per_unit:.5g} "
