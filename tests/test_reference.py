@@ -9,7 +9,6 @@ import trihedron
 from reference_rig import G, commanded_table, forces, hand, measured_table, rates_of, times, tracked, unit
 from trihedron._core import rotation_from_vector
 from trihedron.api.beside import shared_log
-from trihedron.cli import _a_reference_each
 from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
 from trihedron.estimate.reference.fit import fit_reference
 from trihedron.files.calibration import diagnosis_document
@@ -297,10 +296,3 @@ def test_an_attitude_that_the_gyro_itself_carried_is_not_independent(found):
     assert "mounted-without-error" in {sign.kind for sign in carried.error.signs}
     assert any(f.code is FindingCode.REFERENCE_NOT_INDEPENDENT for f in carried.findings)
     assert not found.error.signs
-
-
-def test_as_many_references_behind_the_option_as_logs_before_it_are_one_each():
-    words = ["calibrate", "A", "B", "--reference", "TA", "TB", "--gravity", "9.8"]
-    assert _a_reference_each(words) == [*words[:5], "--reference", *words[5:]]
-    alone = ["diagnose", "--reference", "T", "A"]
-    assert _a_reference_each(alone) == alone

@@ -49,14 +49,6 @@ def _version(asked: bool) -> None:
         raise typer.Exit
 
 
-def _manual(asked: bool) -> None:
-    if asked:
-        from trihedron.cli.manual import manual
-
-        typer.echo(manual(typer.main.get_command(build_app())))
-        raise typer.Exit
-
-
 def build_app() -> typer.Typer:
     """The command with all its subcommands."""
     app = typer.Typer(
@@ -76,30 +68,13 @@ def build_app() -> typer.Typer:
 
 def trihedron(
     version: bool = typer.Option(False, "--version", help="Print the version.", is_eager=True, callback=_version),
-    man: bool = typer.Option(
-        False, "--man", help="Print the manual page (trihedron --man | man -l -).", is_eager=True, callback=_manual
-    ),
 ) -> None:
     """Calibrate an IMU from a raw log, with the uncertainty of every parameter."""
-
-
-def _a_reference_each(words: list[str]) -> list[str]:
-    """``A B --reference TA TB`` as one option per reference: as many names after the option as logs before it."""
-    if words.count("--reference") != 1:
-        return words
-    at = words.index("--reference")
-    behind = next((k for k, word in enumerate(words[at + 1 :]) if word.startswith("-")), len(words) - at - 1)
-    before = next((k for k, word in enumerate(words[1:at]) if word.startswith("-")), at - 1)
-    if behind < 2 or behind != before:
-        return words
-    options = [word for name in words[at + 1 : at + 1 + behind] for word in ("--reference", name)]
-    return [*words[:at], *options, *words[at + 1 + behind :]]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status; an input error gives one sentence, never a traceback."""
     words = _with_stdout_as_default(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
-    words = _a_reference_each(words)
     spell_out()
     begin(words)
     try:

@@ -7,49 +7,15 @@ from textwrap import wrap
 
 from rich.console import Group
 from rich.panel import Panel
-from rich.table import Table
 from rich.text import Text
 
-from trihedron.arrays import FloatArray
 from trihedron.records.guiding import Examination, GuideView, Phase, Uncertain
 from trihedron.report.numbers import how_many
 
 # Names of the sixteen ANSI colours, which follow the terminal's theme.
 GOOD, BAD, DIM, STRONG = "green", "red", "dim", "bold"
 
-POSE, HERE, TARGET = "o", "@", "X"
 _ASIDE = re.compile(r" \([^)]*\)")
-
-
-def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
-    """Directions of the vertical in the body on two discs seen from Z: upper hemisphere left, lower right."""
-    discs = [[[" "] * width for _ in range(height)] for _ in range(2)]
-    for disc in discs:
-        for i in range(height):
-            for j in range(width):
-                x, y = (2 * j - width + 1) / (width - 1), (2 * i - height + 1) / (height - 1)
-                if abs(math.hypot(x, y) - 1.0) < 1.2 / height:
-                    disc[i][j] = "."
-        disc[height // 2][width // 2] = "+"
-
-    def put(up: FloatArray, mark: str) -> None:
-        which = 0 if up[2] >= 0.0 else 1
-        # Equal-area projection.
-        radius = math.sqrt(max(1.0 - abs(float(up[2])), 0.0))
-        length = math.hypot(float(up[0]), float(up[1])) or 1.0
-        j = round((float(up[0]) / length * radius + 1.0) / 2.0 * (width - 1))
-        i = round((1.0 - float(up[1]) / length * radius) / 2.0 * (height - 1))
-        discs[which][min(max(i, 0), height - 1)][min(max(j, 0), width - 1)] = mark
-
-    if view.examination is not None:
-        for up in view.examination.poses_up:
-            put(up, POSE)
-    if view.target_up is not None:
-        put(view.target_up, TARGET)
-    if view.up_now is not None:
-        put(view.up_now, HERE)
-    rows = ["".join(left) + "  " + "".join(right) for left, right in zip(*discs, strict=True)]
-    return [f"{'+Z up':^{width}}  {'-Z up':^{width}}", *rows]
 
 
 def bar(share: float, width: int) -> str:
@@ -74,14 +40,8 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     angle = view.degrees_to_target
     if angle is not None and view.phase in (Phase.MOVE, Phase.CHECK):
         lines[1].append(f"  ({angle:.0f} degrees to go)")
-    body = Table.grid(padding=(0, 2))
-    body.add_column(no_wrap=True)
-    body.add_column(no_wrap=True)
-    tall = height >= 36
-    sphere = hemispheres(view, 25 if tall and width >= 110 else 17, 13 if tall and width >= 110 else 9)
-    legend = f"{POSE} taken  {HERE} now  {TARGET} next"
-    body.add_row(Text("\n".join([*sphere, legend])), _parameters(view.examination, tall=tall))
     known = view.examination
+    body = _parameters(known, tall=height >= 36)
     # Facts that do not fit are omitted, the last first.
     facts = [how_many(view.n_poses, "pose"), *([] if known is None else [_to_go(known)]), f"{lost} lost"]
     facts += [] if seconds is None else [f"{seconds:.0f} s"]

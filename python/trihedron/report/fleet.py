@@ -44,6 +44,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     n_done = n - len(bad)
     mixed = {one.serial for one in summary.mixed}
     n_devices = how_many(len({log.serial for log in summary.logs}), "device") + (" or more" if mixed else "")
+    moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
@@ -56,20 +57,16 @@ def fleet_report(summary: FleetSummary) -> Document:
     if summary.repeated:
         heading = "How devices differ" if len(devices) > 1 else "How the logs differ"
         sections.append(Section(heading, tuple(_spread(summary))))
-    if summary.outliers or summary.repeated:
+    if summary.outliers:
         sections.append(Section("Outliers", tuple(_outliers(summary))))
-    if summary.changes:
+    if moved:
         sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
     n_usable = sum(map(is_usable, summary.logs))
     lead = None
     if n_done:
         caption = "The parameters that differ most beside their uncertainties: a point ± 1 σ for each log, about the "
         caption += "median of devices."
-        if n_usable < n_done:
-            caption += " Logs that are not to be trusted stand under Distributions."
-        lead = Picture("differ", caption, partial(fleet_chart, summary, MOST_NAMED))
-        caption = "Every parameter by device, a point ± 1 σ for each log; the line is the median of devices."
-        sections.append(Section("Distributions", (Picture("numbers", caption, partial(fleet_chart, summary)),)))
+        lead = Picture("differ", caption, partial(fleet_chart, summary))
     sections.append(Section("Every log", (_logs(summary),)))
     verdict = f"{n_usable} of {how_many(n, 'log')} usable{_warned(summary)}, of {n_devices}."
     if n_done == 0:
@@ -87,7 +84,6 @@ def fleet_report(summary: FleetSummary) -> Document:
         named = first_of([id_in_print(effect.id) for effect in summary.effects])
         verdict += f" Diagnosis: {listed(found)}{f' ({named})' if named else ''}."
     outliers = list(dict.fromkeys(one.serial for one in summary.outliers))
-    moved = list(dict.fromkeys(change.group for change in summary.changes if change.significant))
     if summary.repeated and len(devices) > 1 and not outliers and not mixed:
         verdict += f" {_within(summary)}"
     if outliers:
@@ -180,10 +176,6 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
         facts.append(("from before", f"{how_many(summary.n_before, 'result')} of an earlier run were kept"))
     for verdict, count in Counter(log.verdict for log in summary.logs if log.verdict and is_usable(log)).most_common():
         facts.append((verdict, f"{how_many(count, 'log')}: {VERDICTS.get(verdict, '')}"))
-    seconds = [log.seconds for log in summary.logs if log.seconds is not None]
-    if seconds:
-        longest = f"{plain_number(max(seconds), 2)} s the longest log"
-        facts.append(("work", f"{plain_number(sum(seconds), 3)} s in all, {longest}"))
     return tuple(facts)
 
 
@@ -237,8 +229,6 @@ def _within(summary: FleetSummary) -> str:
 
 
 def _outliers(summary: FleetSummary) -> list[Block]:
-    if not summary.outliers:
-        return [Paragraph(_within(summary))]
     rows = [
         (
             one.serial,
@@ -258,8 +248,6 @@ def _drift(summary: FleetSummary) -> list[Block]:
     n_devices = len({change.group for change in summary.changes})
     tested = f"{how_many(n_devices, 'device')} with two compared logs or more, seven groups of parameters each, 1 % "
     tested += "over all."
-    if not moved:
-        return [Paragraph(f"No calibration shift between sessions beyond uncertainty and drift: {tested}")]
     rows = []
     for change in moved:
         how, sizes, unit = change_in_words(change)
@@ -289,15 +277,12 @@ def _logs(summary: FleetSummary) -> Table:
     return Table(head, rows, "What became of every log")
 
 
-def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
-    """One panel per parameter: devices along the axis, one point per log with its standard error, about the median.
-
-    ``most``: only that many parameters, those in which devices differ most relative to their standard errors.
-    """
+def fleet_chart(summary: FleetSummary) -> Chart:
+    """A panel for each of the parameters in which devices differ most relative to their standard errors: one point
+    ± 1 σ for each log, about the median."""
     logs = [log for log in summary.logs if log.numbers is not None and log.std is not None]
-    if most is not None:
-        # One calibration that is not to be trusted would set the scale of all.
-        logs = [log for log in logs if log.is_trustworthy] or logs
+    # One calibration that is not to be trusted would set the scale of all.
+    logs = [log for log in logs if log.is_trustworthy] or logs
     n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)
     serials = list(dict.fromkeys(log.serial for log in logs))
     outliers = {(one.serial, one.parameter) for one in summary.outliers}
@@ -313,8 +298,7 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
     panels = []
     apart = numbers - np.median(numbers, axis=0)
     strength = np.sum((apart / np.where(errors > 0.0, errors, np.inf)) ** 2, axis=0)
-    chosen = range(n) if most is None else sorted(np.argsort(-strength)[:most].tolist())
-    for k in chosen:
+    for k in sorted(np.argsort(-strength)[:MOST_NAMED].tolist()):
         parameter = PARAMETERS[k]
         factor, unit = shown(parameter.unit)
         centre = float(np.median([numbers[serial_of == s, k].mean() for s in range(len(serials))]))
@@ -332,4 +316,4 @@ def fleet_chart(summary: FleetSummary, most: int | None = None) -> Chart:
                 marks.append(Points(across[part], values[part], tips, error[part], name, colour))
         y = Scale(f"{label_of(parameter.id, parameter.name)}  [{unit}]", unit)
         panels.append(Panel(x, y, tuple(marks), height_px=150))
-    return Chart(tuple(panels), columns=3 if most is None else 2)
+    return Chart(tuple(panels), columns=2)

@@ -30,7 +30,7 @@ from trihedron.report.segments import if_rate_is_right
 from trihedron.report.verification import USES
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
-"""Groups of parameters in the first picture and the headlines; the others follow below."""
+"""Groups of parameters in the picture and the headlines."""
 REPEATS = "session to session (1 σ)"
 SEVERAL = "Several devices"
 MOST_NAMED = 6
@@ -59,15 +59,14 @@ def sessions_report(model: SessionsModel) -> Document:
         Section("Result", (Facts(_facts(model)), *_repeatability(model))),
         Section("Findings", (findings_block(model.findings),)),
     ]
-    if model.changes:
-        sections.append(Section("Did anything change?", tuple(_changes(model))))
+    if changed:
+        sections.append(Section("What changed", (_changes(model, changed),)))
     if model.thermal is not None:
         sections.append(Section("Temperature", tuple(_thermal(model.thermal))))
     recordings = _sessions(model)
     if len(recordings.head) > 1:
         # Names alone are in the title already.
         sections.append(Section("Recordings", (recordings,)))
-    sections += [Section("Figures", (picture,)) for picture in _further(model)]
     names = [session.name for session in model.sessions]
     usable = f"Usable: {agree}"
     if changed:
@@ -140,7 +139,7 @@ def found_or_limit(spread: Spread, factor: float) -> str:
 
 def _lead(model: SessionsModel) -> Picture:
     """Scales and biases of every recording."""
-    chart = partial(sessions_chart, model, DRIFTING, 2)
+    chart = partial(sessions_chart, model)
     has_band = model.thermal is None and any(one.within is not None and one.within.sd for one in model.repeated)
     caption = f"Scale and bias of both sensors in every recording, about the common value; {ONE_SIGMA}"
     caption += "; band: session to session (1 σ)." if has_band else "."
@@ -206,16 +205,17 @@ def repeated_cells(one: Repeated, kinds: tuple[str, ...]) -> list[str]:
     return cells
 
 
-def _changes(model: SessionsModel) -> list[Block]:
-    rows = []
+def _changes(model: SessionsModel, changed: Sequence[Change]) -> Table:
     with_group = model.by == "device"
-    for change in model.changes:
-        cells = [id_in_print(change.id), *([change.group] if with_group else []), plain_number(change.p_adjusted, 2)]
-        rows.append((*cells, _said(change) if change.significant else "no"))
-    head = ("parameter", *(["device"] if with_group else []), "p", "changed")
-    said = "Each parameter of all recordings against one common value, by each recording's uncertainty and the drift "
-    said += "of its biases; p corrected for multiple testing (Holm)."
-    return [Paragraph(said), Table(head, tuple(rows), "Changes beyond what repeats")]
+    rows = tuple(
+        (id_in_print(one.id), *([one.group] if with_group else []), plain_number(one.p_adjusted, 2), _said(one))
+        for one in changed
+    )
+    head = ("parameter", *(["device"] if with_group else []), "p", "change")
+    caption = (
+        "Changes beyond each recording's uncertainty and the drift of its biases; p corrected for multiple testing "
+    )
+    return Table(head, rows, f"{caption}(Holm)")
 
 
 def change_in_words(change: Change) -> tuple[str, list[str], str]:
@@ -273,14 +273,6 @@ def _sessions(model: SessionsModel) -> Table:
     return Table(head, tuple(zip(*cells, strict=True)), "Every recording")
 
 
-def _further(model: SessionsModel) -> list[Picture]:
-    """Groups of parameters that the first picture does not show."""
-    others = tuple(name for name in dict.fromkeys(one.parameter.id for one in model.repeated) if name not in DRIFTING)
-    chart = partial(sessions_chart, model, others)
-    caption = f"The other parameters in every recording, about the common value; {ONE_SIGMA}."
-    return [Picture("sessions", caption, chart)] if others else []
-
-
 def _short_names(names: Sequence[str]) -> tuple[str, ...]:
     """Short names of files for an axis, without a file name or an ending that all share."""
     paths = [PurePath(name) for name in names]
@@ -297,8 +289,8 @@ def _compared_variance(sessions: Sequence[Session], k: int) -> FloatArray:
     return np.array([max(s.covariance[k, k] + drift[s.group], 0.0) for s in sessions])
 
 
-def sessions_chart(model: SessionsModel, only: Sequence[str], columns: int = 1) -> Chart:
-    """One panel per id: deviations from the common value, over temperature where modelled; ``only`` these ids."""
+def sessions_chart(model: SessionsModel) -> Chart:
+    """Scales and biases: deviations from the common value, over temperature where modelled."""
     places = np.arange(1.0, len(model.sessions) + 1.0)
     names = _short_names([session.name for session in model.sessions])
     x = Scale("recording", whole=True, names=names, limits=(0.5, len(places) + 0.5))
@@ -306,7 +298,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str], columns: int = 1) 
         places = np.array([session.temperature_degc for session in model.sessions])
         x = Scale("temperature [°C]", "°C")
     panels = []
-    for name in dict.fromkeys(one.parameter.id for one in model.repeated if one.parameter.id in only):
+    for name in dict.fromkeys(one.parameter.id for one in model.repeated if one.parameter.id in DRIFTING):
         picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
         unit = shown(PARAMETERS[picked[0]].unit)[1]
         # The bands of all axes lie behind their points.
@@ -315,7 +307,7 @@ def sessions_chart(model: SessionsModel, only: Sequence[str], columns: int = 1) 
         for axis, k in enumerate(picked):
             marks += _deviations(model, k, axis, places)
         panels.append(Panel(x, Scale(f"{id_in_print(name)}  [{unit}]", unit), tuple(marks), height_px=170))
-    return Chart(tuple(panels), columns=columns, is_linked=True)
+    return Chart(tuple(panels), columns=2, is_linked=True)
 
 
 def _band(model: SessionsModel, k: int, n: int) -> list[Mark]:
