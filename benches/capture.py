@@ -22,11 +22,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import trihedron
 from board import DECLARED, Board, counts_recording
 from trihedron.api.capturing import column_namer
-from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.recorder import Recorder
 from trihedron.capture.sources import open_source
 from trihedron.capture.timeline import Count
-from trihedron.files.frame_declaration import FrameDeclaration, read_frame_declaration
+from trihedron.protocols import decoder_factory
+from trihedron.protocols.declared import FrameDeclaration, read_frame_declaration
 from trihedron.simulate.device.faults import Sent, parse_faults
 from trihedron.simulate.device.serving import Device, PseudoTerminal, serve
 

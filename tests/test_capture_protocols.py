@@ -1,9 +1,8 @@
-"""Bytes to frames: every protocol, every fault, whatever the pieces; encoders of the simulated board are the oracle."""
+"""Bytes to frames: every protocol, every fault, whatever the pieces; frames of the simulated board."""
 
 import random
 import re
 import struct
-import zlib
 
 import numpy as np
 import pytest
@@ -11,14 +10,13 @@ import pytest
 import trihedron
 from board import DECLARED, counts_recording
 from trihedron.api.capturing import column_namer
-from trihedron.capture.protocols import decoder_factory
-from trihedron.capture.protocols.framing import CHECKSUM_OF, Frame
 from trihedron.capture.sequence import Sequence
 from trihedron.capture.timeline import Count
 from trihedron.cli import main
-from trihedron.files.frame_declaration import read_frame_declaration
+from trihedron.protocols import decoder_factory, encoder_for
+from trihedron.protocols.declared import read_frame_declaration
+from trihedron.protocols.framing import CHECKSUMS, Frame, Sample
 from trihedron.records import Recording
-from trihedron.simulate.device.encoders import encoder_for
 from trihedron.simulate.device.faults import Faults, Sent, parse_faults
 from trihedron.simulate.device.serving import Device
 
@@ -157,15 +155,13 @@ def test_a_clock_that_wraps_or_stutters_loses_nothing(modulus):
 
 def test_checksums_have_their_published_check_values():
     # Values over "123456789" of the catalogue of parametrised CRC algorithms.
-    data = b"123456789"
-    assert CHECKSUM_OF["crc8"](data) == 0xF4
-    assert CHECKSUM_OF["crc16-ccitt"](data) == 0x29B1
-    assert CHECKSUM_OF["crc16-modbus"](data) == 0x4B37
-    assert CHECKSUM_OF["crc16-kermit"](data) == 0x2189
-    assert CHECKSUM_OF["crc32"](data) == 0xCBF43926 == zlib.crc32(data)
+    values = {kind: function(b"123456789") for kind, (_, function) in CHECKSUMS.items() if kind.startswith("crc")}
+    assert values.pop("crc8") == 0xF4
+    assert values.pop("crc32") == 0xCBF43926
+    assert values == {"crc16-ccitt": 0x29B1, "crc16-modbus": 0x4B37, "crc16-kermit": 0x2189}
 
 
-@pytest.mark.parametrize("kind", list(CHECKSUM_OF))
+@pytest.mark.parametrize("kind", list(CHECKSUMS))
 @pytest.mark.parametrize("endian", ["little", "big"])
 def test_a_declared_frame_is_read_with_any_checksum_and_byte_order(kind, endian, tmp_path):
     path = tmp_path / "x.toml"
@@ -218,6 +214,24 @@ def test_the_published_example_of_an_inertial_message_is_read():
     assert first.values == second.values == (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
+BY_HAND = [
+    ("sparkfun-6dof", "41 0005 0201 0200 0300 0204 0202 0203 5A", (513.0, 512.0, 768.0, 516.0, 514.0, 515.0)),
+    # 0x0800 of 2^15 is one g of sixteen, 0x1000 is 250 deg/s of 2000, 0x09C4 is 25 degrees; the sums modulo 256.
+    (
+        "witmotion",
+        "55 51 0008 0000 00F8 C409 73  55 52 0010 0000 00F0 0000 A7",
+        (1.0, 0.0, -1.0, 250.0, 0.0, -250.0, 25.0),
+    ),
+]
+
+
+@pytest.mark.parametrize(("protocol", "frame", "values"), BY_HAND)
+def test_a_frame_written_by_hand_from_the_data_sheet_is_read(protocol, frame, values):
+    decoder = decoder_factory(protocol)()
+    (found,) = [*decoder.feed(bytes.fromhex(frame)), *decoder.finish()]
+    assert found.values == values
+
+
 @pytest.mark.parametrize("flipped", [b"1.0\x0c", b"1_0"])
 def test_a_flipped_bit_that_python_reads_past_leaves_no_cell_that_the_log_cannot_hold(flipped):
     line = b"I,1000000,0.0,0.0,0.0,0.0,0.0,1.0\n"
@@ -259,7 +273,8 @@ def test_what_a_clock_says_is_lost_stands_in_the_log(board, tmp_path):
     recording = still()
     encode = encoder_for(board)
     force, rate = recording.accelerometer / 100, recording.gyroscope
-    frames = [encode(k, float(t), force[k], rate[k]) for k, t in enumerate(recording.time_s)]
+    readings = np.hstack([force, rate])
+    frames = [encode(Sample(k, float(t), *[readings[k]] * 2)) for k, t in enumerate(recording.time_s)]
     # One sample is gone whole, of another the last bytes.
     (tmp_path / "stream").write_bytes(b"".join(frames[:50] + frames[51:120] + [frames[120][:-20]] + frames[121:]))
     assert main(["capture", str(tmp_path / "stream"), "-o", str(tmp_path / "log.csv")]) == 0
@@ -288,7 +303,7 @@ def test_the_lines_of_a_vectornav_are_checked_by_either_checksum(check):
 def test_counts_of_an_sbg_are_as_large_as_its_status_says(status, per_rad_s):
     counts = [1048576, -2097152, 9 * 1048576, per_rad_s, -per_rad_s // 2, 0, 6400]
     inner = struct.pack("<BBHIH6ih", 44, 0, 32, 5000, status, *counts)
-    message = b"\xff\x5a" + inner + struct.pack("<HB", CHECKSUM_OF["crc16-kermit"](inner), 0x33)
+    message = b"\xff\x5a" + inner + struct.pack("<HB", CHECKSUMS["crc16-kermit"][1](inner), 0x33)
     decoder = decoder_factory("sbg")()
     (frame,) = [*decoder.feed(message), *decoder.finish()]
     assert frame.values == pytest.approx((1.0, -2.0, 9.0, 1.0, -0.5, 0.0, 25.0), rel=1e-7)

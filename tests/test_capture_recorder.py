@@ -18,10 +18,10 @@ from trihedron.arrivals import ClockFit, paced
 from trihedron.capture.detection import find_protocol
 from trihedron.capture.errors import CaptureError
 from trihedron.capture.log import GrowingLog
-from trihedron.capture.protocols import decoder_factory
 from trihedron.capture.recorder import Recorder
 from trihedron.capture.sources import open_source
 from trihedron.cli import main
+from trihedron.protocols import decoder_factory
 from trihedron.simulate.device.faults import Faults, Sent, parse_faults
 from trihedron.simulate.device.serving import Device
 

@@ -45,9 +45,9 @@ def answered(*readers: Callable[[], object]) -> str:
 def _readers() -> dict[str, list[Callable[[Path], object]]]:
     from trihedron.api.exporting import export
     from trihedron.files.calibration import read_calibration
-    from trihedron.files.frame_declaration import read_frame_declaration
     from trihedron.files.noise import read_noise
     from trihedron.files.scenario import improved_scenario
+    from trihedron.protocols.declared import read_frame_declaration
     from trihedron.read.allan_table import read_allan_table
     from trihedron.read.axis_noise import read_axis_noise
     from trihedron.read.pose_table import read_pose_table

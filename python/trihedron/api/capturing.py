@@ -19,17 +19,16 @@ import numpy.typing as npt
 from trihedron.api.reading import read
 from trihedron.arrays import AXES
 from trihedron.capture.detection import Found, find_protocol
-from trihedron.capture.protocols import LineColumns, NameColumns
 from trihedron.capture.recorder import Block, Recorder
 from trihedron.capture.sources import Port, Source, list_ports, open_source
 from trihedron.errors import InputError
-from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.files.output import check_free
+from trihedron.protocols import protocol_of
+from trihedron.protocols.lines import LineColumns, NameColumns
 from trihedron.read.clock.unit import TICKS, parse_time_unit, seconds_of
 from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
 from trihedron.records import Recording
-from trihedron.records.frame_declaration import FrameDeclaration
 
 Cells = npt.NDArray[np.float64]
 
@@ -38,13 +37,6 @@ PLAUSIBLE_HZ = (2.0, 20_000.0)
 
 USUAL_HZ = 100.0
 """Of two units that fit a time step, the one whose rate is nearer to this in ratio is used."""
-
-
-def protocol_of(text: str | None) -> str | FrameDeclaration | None:
-    """A protocol by name, a frame declared in a .toml file, or None for detection."""
-    if text is None or text == "auto":
-        return None
-    return read_frame_declaration(text) if text.lower().endswith(".toml") else text
 
 
 def open_device(

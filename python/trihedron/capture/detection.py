@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
-from trihedron.capture.protocols import PROTOCOLS, Decoder, decoder_factory
-from trihedron.capture.protocols.framing import Frame
-from trihedron.capture.protocols.lines import NameColumns, name_by_position
 from trihedron.capture.sources import SerialSource, Source
-from trihedron.records.frame_declaration import FrameDeclaration
+from trihedron.protocols import PROTOCOLS, decoder_factory
+from trihedron.protocols.declared import FrameDeclaration
+from trihedron.protocols.framing import Decoder, Frame
+from trihedron.protocols.lines import NameColumns, name_by_position
 
 _AS_LOG = "read the log itself with `trihedron check`"
 _FILES: tuple[tuple[bytes, str, str], ...] = (

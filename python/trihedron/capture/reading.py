@@ -10,10 +10,10 @@ from pathlib import Path
 from trihedron.arrivals import ClockLine
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.log import GrowingLog
-from trihedron.capture.protocols import Decoder
 from trihedron.capture.sequence import Placed
 from trihedron.capture.sources import Source
 from trihedron.capture.timeline import Count, Timeline, clock_sentence
+from trihedron.protocols.framing import Decoder
 
 
 class Rows(GrowingLog):

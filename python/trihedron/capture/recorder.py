@@ -12,11 +12,11 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.arrivals import ClockLine
 from trihedron.capture.detection import silent
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
-from trihedron.capture.protocols import Decoder
 from trihedron.capture.reading import ReadingThread, Rows, SourceReturned, Stopped
 from trihedron.capture.sequence import Placed, Sequence
 from trihedron.capture.sources import Source
 from trihedron.capture.timeline import Count, Tally, Timeline, clock_sentence
+from trihedron.protocols.framing import Decoder
 
 SETTLE_S = 0.6
 """Without a device clock, rows wait this long [s] at the start of a connection, until arrivals give their rate."""

@@ -9,8 +9,8 @@ from itertools import pairwise
 from statistics import median
 from typing import NamedTuple
 
-from trihedron.capture.protocols.framing import Frame
 from trihedron.capture.timeline import Tally
+from trihedron.protocols.framing import Frame
 
 LEARN = 8
 """Frames from which the clock's step is first estimated (mean of the steps up to 1.6 times their median)."""

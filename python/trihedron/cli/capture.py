@@ -63,7 +63,7 @@ def capture(
     force: bool = False,
 ) -> None:
     """Record what a board sends into a log, written as it arrives; lost samples are counted and reported."""
-    from trihedron.capture.protocols import PROTOCOLS
+    from trihedron.protocols import PROTOCOLS
 
     if list_them:
         for name, sentence in PROTOCOLS.items():

@@ -28,7 +28,7 @@ def serve_recording(
     link: Path | None,
 ) -> None:
     """Send a recording over a pseudo-terminal or a socket until it ends; prints the address on stdout first."""
-    from trihedron.api.capturing import protocol_of
+    from trihedron.protocols import protocol_of
     from trihedron.simulate.device.faults import Sent, parse_faults
     from trihedron.simulate.device.serving import Device, PseudoTerminal, TcpServer, scales_of, serve
 

@@ -20,9 +20,8 @@ class Faults:
     ``missing``: the frame is not sent. ``cut``: only its beginning is sent. ``flipped``: one bit is inverted.
     ``garbage``: 1 to 40 random bytes precede it. ``byte_lost``, ``byte_doubled``: one byte. ``twice``: sent twice.
     ``drift_ppm``: the board clock runs fast by that. ``start_text``: lines printed first. ``disconnect_s``: instants at
-    which the board disconnects for ``away_s``. ``pause_s``: instants from which it sends nothing for ``paused_s`` while
-    its counter and clock run on. The first and last ``clean_ends`` frames have no faults: losses before the first and
-    after the last saved frame cannot be counted.
+    which the board disconnects for ``away_s``. The first and last ``clean_ends`` frames have no faults: losses before
+    the first and after the last saved frame cannot be counted.
     """
 
     missing: float = 0.0
@@ -35,15 +34,8 @@ class Faults:
     drift_ppm: float = 0.0
     disconnect_s: tuple[float, ...] = ()
     away_s: float = 1.0
-    pause_s: tuple[float, ...] = ()
-    paused_s: float = 0.5
     start_text: bool = False
     clean_ends: int = 0
-
-    def during(self, t: float) -> Faults:
-        """The faults at device time ``t`` [s]: in a pause every frame is missing."""
-        is_paused = any(begin <= t < begin + self.paused_s for begin in self.pause_s)
-        return Faults(missing=1.0) if is_paused else self
 
 
 def parse_faults(text: str) -> Faults:

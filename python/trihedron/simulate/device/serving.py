@@ -12,9 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from trihedron.protocols import encoder_for
+from trihedron.protocols.declared import FrameDeclaration
+from trihedron.protocols.framing import Sample
+from trihedron.protocols.lines import HEADERS
 from trihedron.records import Recording, Truth
-from trihedron.records.frame_declaration import FrameDeclaration
-from trihedron.simulate.device.encoders import LINE_HEADERS, Scales, encoder_for
 from trihedron.simulate.device.faults import Faults, Sent, spoil
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -28,7 +30,7 @@ PIECE_S = 0.004
 class Device:
     """A recording that a simulated board sends: protocol, faults, and ``speed`` over real time (0: no waiting).
 
-    ``scales`` convert raw units to SI for protocols in SI.
+    ``scales`` are SI per raw unit of accelerometer and gyro, for protocols in SI.
     """
 
     recording: Recording
@@ -37,39 +39,41 @@ class Device:
     speed: float = 1.0
     seed: int = 0
     baud: int = 0
-    scales: Scales | None = None
+    scales: tuple[float, float] | None = None
 
     def pieces(self, sent: Sent) -> Iterator[tuple[float, bytes]]:
         """Yield (device time [s], bytes) piece by piece."""
         recording, faults = self.recording, self.faults
-        encode = encoder_for(self.protocol, self.scales or scales_of(recording))
+        encode = encoder_for(self.protocol)
         rng = random.Random(self.seed)
-        zero = (0.0, 0.0, 0.0)
-        accel = [zero] * recording.n_samples if recording.accelerometer is None else recording.accelerometer.tolist()
-        gyro = [zero] * recording.n_samples if recording.gyroscope is None else recording.gyroscope.tolist()
-        none = Faults()
+        none, absent = Faults(), np.zeros((recording.n_samples, 3))
+        sensors = [absent if one is None else one for one in (recording.accelerometer, recording.gyroscope)]
+        raw = np.hstack(sensors)
+        in_si = (raw * np.repeat(self.scales or scales_of(recording), 3)).tolist()
+        readings = raw.tolist()
         fast = 1.0 + faults.drift_ppm * 1e-6
         if faults.start_text:
             yield 0.0, _BOOT_TEXT
-        if isinstance(self.protocol, str) and self.protocol in LINE_HEADERS:
-            yield 0.0, LINE_HEADERS[self.protocol].encode()
+        if isinstance(self.protocol, str) and self.protocol in HEADERS:
+            yield 0.0, HEADERS[self.protocol].encode()
         piece, start_s = bytearray(), 0.0
         for n, t in enumerate(recording.time_s.tolist()):
             if piece and t - start_s >= PIECE_S:
                 yield t, bytes(piece)
                 piece, start_s = bytearray(), t
             is_end = n < faults.clean_ends or n >= recording.n_samples - faults.clean_ends
-            piece += spoil(encode(n, t * fast, accel[n], gyro[n]), n, none if is_end else faults.during(t), rng, sent)
+            frame = encode(Sample(n, t * fast, readings[n], in_si[n]))
+            piece += spoil(frame, n, none if is_end else faults, rng, sent)
         yield float(recording.time_s[-1]), bytes(piece)
 
 
-def scales_of(recording: Recording, truth: Truth | None = None) -> Scales:
+def scales_of(recording: Recording, truth: Truth | None = None) -> tuple[float, float]:
     """SI per raw unit: from the unit, or for counts from the mean column norm of the true S, as in a data sheet."""
     accel, gyro = acceleration_to_si(recording.accelerometer_unit), rate_to_si(recording.gyroscope_unit)
     if truth is not None:
         accel = accel or float(np.mean(np.linalg.norm(truth.accelerometer_S, axis=0)))
         gyro = gyro or float(np.mean(np.linalg.norm(truth.gyroscope_S, axis=0)))
-    return Scales(accel or 1e-3, gyro or 2e-4)
+    return accel or 1e-3, gyro or 2e-4
 
 
 class PseudoTerminal:

@@ -7,7 +7,7 @@ little-endian, line feeds and escapes inside replaced as in SLIP (0xDB 0xDC, 0xD
 import math
 import struct
 
-from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers, triad
+from trihedron.protocols.framing import Frame, LineFedDecoder, Sample, printed_numbers, triad
 
 _INERTIAL = 0x80 + ord("I")
 _BODY = struct.Struct("<xQ6f")
@@ -68,3 +68,23 @@ class XioDecoder(LineFedDecoder):
 
 
 SPOKEN = {XioDecoder: "xio x-IMU3 inertial messages, text or binary"}
+
+
+def _numbers(sample: Sample) -> list[float]:
+    numbers = sample.in_g_and_degrees
+    return numbers[3:] + numbers[:3]
+
+
+def encode_binary(sample: Sample) -> bytes:
+    """A binary message; its first byte is none that is replaced."""
+    raw = _BODY.pack(round(sample.time_s * 1e6), *_numbers(sample))[1:]
+    return bytes([_INERTIAL]) + raw.replace(_ESCAPE, b"\xdb\xdd").replace(b"\n", b"\xdb\xdc") + b"\n"
+
+
+def encode_text(sample: Sample) -> bytes:
+    """A text message."""
+    numbers = ",".join(f"{v:.4f}" for v in _numbers(sample))
+    return f"I,{round(sample.time_s * 1e6)},{numbers}\r\n".encode()
+
+
+ENCODERS = {"xio": encode_binary, "xio-text": encode_text}

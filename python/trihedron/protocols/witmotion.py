@@ -6,8 +6,9 @@ if the sensor sends it, precedes them.
 """
 
 import struct
+from functools import partial
 
-from trihedron.capture.protocols.framing import DAY_MS, Frame, FramedDecoder, triad
+from trihedron.protocols.framing import DAY_MS, Frame, FramedDecoder, Sample, triad
 
 _CLOCK, _ACCELERATION, _RATE = 0x50, 0x51, 0x52
 _LAST_KIND = 0x5F
@@ -93,3 +94,19 @@ def _milliseconds(frame: bytes) -> int:
 
 
 SPOKEN = {WitMotionDecoder: "WitMotion packets 0x55 0x51, 0x52 (clock 0x50 where it is sent)"}
+
+
+def encode(sample: Sample, *, has_clock: bool) -> bytes:
+    """The packets of a sample, and one of angles."""
+    sizes = [_G] * 3 + [_DEGREES] * 3
+    counts = [round(v / size) for v, size in zip(sample.in_g_and_degrees, sizes, strict=True)]
+    ax, ay, az, gx, gy, gz = (min(max(n, -32768), 32767) for n in counts)
+    ms = round(1e3 * sample.time_s)
+    clock = struct.pack("<6BH", 24, 3, 1, 12 + ms // 3_600_000, ms // 60_000 % 60, ms // 1000 % 60, ms % 1000)
+    content = [(_CLOCK, clock)] if has_clock else []
+    content += [(_ACCELERATION, struct.pack("<4h", ax, ay, az, 2525)), (_RATE, struct.pack("<4h", gx, gy, gz, 2525))]
+    packets = (bytes([0x55, kind]) + body for kind, body in [*content, (0x53, bytes(8))])
+    return b"".join(packet + bytes([sum(packet) & 0xFF]) for packet in packets)
+
+
+ENCODERS = {"witmotion": partial(encode, has_clock=False), "witmotion-clock": partial(encode, has_clock=True)}

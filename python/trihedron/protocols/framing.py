@@ -1,16 +1,12 @@
 """Decoders: bytes in, frames out, corrupt and skipped bytes counted; frames by sync and length, or by line."""
 
 import binascii
-import struct
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import xor
 from typing import NamedTuple
-
-from trihedron.errors import InputError
-from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
 
 DAY_MS = 86_400_000
 
@@ -40,19 +36,21 @@ def _reflected(data: bytes, table: tuple[int, ...], crc: int) -> int:
     return crc
 
 
-CHECKSUM_OF: dict[str, Checksum] = {
-    "sum8": lambda data: sum(data) & 0xFF,
-    "sum8-zero": lambda data: -sum(data) & 0xFF,
-    "xor8": lambda data: reduce(xor, data, 0),
-    "sum16": lambda data: sum(data) & 0xFFFF,
-    "crc8": _crc8,
-    "crc16-ccitt": lambda data: binascii.crc_hqx(data, 0xFFFF),
-    "crc16-modbus": lambda data: _reflected(data, _MODBUS, 0xFFFF),
-    "crc16-kermit": lambda data: _reflected(data, _KERMIT, 0),
-    "crc32": zlib.crc32,
+CHECKSUMS: dict[str, tuple[int, Checksum]] = {
+    "none": (0, lambda _: 0),
+    "sum8": (1, lambda data: sum(data) & 0xFF),
+    "sum8-zero": (1, lambda data: -sum(data) & 0xFF),
+    "xor8": (1, lambda data: reduce(xor, data, 0)),
+    "sum16": (2, lambda data: sum(data) & 0xFFFF),
+    "crc8": (1, _crc8),
+    "crc16-ccitt": (2, lambda data: binascii.crc_hqx(data, 0xFFFF)),
+    "crc16-modbus": (2, lambda data: _reflected(data, _MODBUS, 0xFFFF)),
+    "crc16-kermit": (2, lambda data: _reflected(data, _KERMIT, 0)),
+    "crc32": (4, zlib.crc32),
 }
-"""Functions that compute each kind of checksum over the covered bytes."""
-
+"""Bytes of each kind of checksum, and the function of the covered bytes. ``sum8-zero``: all bytes with the checksum add
+up to zero. ``crc8``: polynomial 0x07. ``crc16-ccitt``: 0x1021, start 0xFFFF. ``crc16-modbus``: 0xA001 reflected, start
+0xFFFF. ``crc16-kermit``: 0x8408 reflected, start 0. ``crc32``: as in zip and Ethernet."""
 
 MORE = -1
 """Returned when more bytes are needed to determine a frame's length or whether it is a frame."""
@@ -73,6 +71,24 @@ class Frame(NamedTuple):
     values: tuple[float, ...]
     text: str
 
+
+class Sample(NamedTuple):
+    """What a simulated board sends in one frame: the frame's number, the board's clock [s], and the six readings, the
+    accelerometer's first, raw and in SI.
+    """
+
+    number: int
+    time_s: float
+    raw: Sequence[float]
+    si: Sequence[float]
+
+    @property
+    def in_g_and_degrees(self) -> list[float]:
+        """The readings in g and deg/s."""
+        return [v / 9.80665 for v in self.si[:3]] + [v * 57.29577951308232 for v in self.si[3:]]
+
+
+Encoder = Callable[[Sample], bytes]
 
 _PRINTED = frozenset("0123456789+-.eE \tnaNinfINF")
 
@@ -266,65 +282,3 @@ class LineFedDecoder(Decoder):
         self.skipped_bytes += len(self._buffer)
         self._buffer.clear()
         return []
-
-
-# Frames of one length that the user declares in TOML.
-
-_CODES = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q"}
-_CODES |= {"f32": "f", "f64": "d"}
-
-
-class DeclaredDecoder(FramedDecoder):
-    """Frames of one fixed length."""
-
-    def __init__(self, declaration: FrameDeclaration) -> None:
-        super().__init__(declaration.sync)
-        self.name = declaration.name
-        self._declaration = declaration
-        order = "<" if declaration.little_endian else ">"
-        self.length = declaration.length
-        values = declaration.values
-        self.columns = tuple(f"{field.name} [{field.unit}]" if field.unit else field.name for field in values)
-        self._scales = tuple(field.scale for field in values)
-        self._is_plain = all(scale == 1.0 for scale in self._scales)
-        # One struct for all fields in order of position; gaps are skipped.
-        ordered = sorted(declaration.fields, key=lambda field: field.at)
-        layout, at = order, 0
-        for field in ordered:
-            if field.at < at:
-                raise InputError(f"{self.name}: field {field.name} overlaps the one before it.")
-            layout += f"{field.at - at}x{_CODES[field.type]}"
-            at = field.at + SIZES[field.type]
-        self._struct = struct.Struct(layout)
-        self._pick = tuple(ordered.index(field) for field in values)
-        self._text = ",".join(
-            "%d" if field.scale == 1.0 and field.type[0] in "ui" else "%.9g" if field.type != "f64" else "%.17g"
-            for field in values
-        )
-        counter, clock = declaration.special("counter"), declaration.special("clock")
-        self._counter = None if counter is None else ordered.index(counter)
-        self._clock = None if clock is None else ordered.index(clock)
-        self.counter_modulus = 0 if counter is None else 1 << (8 * SIZES[counter.type])
-        self.clock_modulus = 0 if clock is None else 1 << (8 * SIZES[clock.type])
-        self.tick_s = 0.0 if clock is None else clock.tick_s
-        self._checksum = None if declaration.checksum == "none" else CHECKSUM_OF[declaration.checksum]
-        self._checksum_end = declaration.checksum_at + CHECKSUM_SIZES[declaration.checksum]
-
-    def is_sound(self, data: bytearray, at: int, length: int) -> bool:  # noqa: ARG002 -- one length
-        """Whether the checksum is right; without a checksum every sync begins a frame."""
-        if self._checksum is None:
-            return True
-        frame = self._declaration
-        said = data[at + frame.checksum_at : at + self._checksum_end]
-        covered = bytes(data[at + frame.covers_from : at + frame.covers_to])
-        return self._checksum(covered) == int.from_bytes(said, "little" if frame.little_endian else "big")
-
-    def decode(self, frame: bytes) -> Frame:
-        """The frame's fields, scaled."""
-        numbers = self._struct.unpack_from(frame)
-        values = tuple(numbers[i] for i in self._pick)
-        if not self._is_plain:
-            values = tuple(v if s == 1.0 else v * s for v, s in zip(values, self._scales, strict=True))
-        counter = None if self._counter is None else numbers[self._counter] % self.counter_modulus
-        ticks = None if self._clock is None else numbers[self._clock] % self.clock_modulus
-        return Frame(counter, ticks, values, self._text % values)

@@ -6,9 +6,9 @@ integers), each with a clock in microseconds and the temperature.
 
 import struct
 
-from trihedron.capture.protocols.framing import CHECKSUM_OF, MORE, Frame, FramedDecoder, triad
+from trihedron.protocols.framing import CHECKSUMS, MORE, Frame, FramedDecoder, Sample, triad
 
-_HEAD, _TAIL, _END = 6, 3, 0x33
+_SYNC, _HEAD, _TAIL, _END = b"\xff\x5a", 6, 3, 0x33
 _LONGEST = 4086
 _LOGS = 0
 """Class of the log messages, which the device sends unprompted."""
@@ -17,6 +17,8 @@ _LAYOUTS = {_DATA: struct.Struct("<IH7f"), _SHORT: struct.Struct("<IH6ih")}
 _PER_M_S2, _PER_DEGREE_C = 1048576.0, 256.0
 _PER_RAD_S, _PER_RAD_S_WIDE, _IS_WIDE = 67108864.0, 12304174.0, 1 << 10
 """Counts of message 44 per unit; ``_IS_WIDE`` in its status means the wider gyro range, with fewer counts per rad/s."""
+
+_, _check = CHECKSUMS["crc16-kermit"]
 
 
 class SbgDecoder(FramedDecoder):
@@ -29,7 +31,7 @@ class SbgDecoder(FramedDecoder):
     learned = ("_kind",)
 
     def __init__(self) -> None:
-        super().__init__(b"\xff\x5a")
+        super().__init__(_SYNC)
         self._kind: int | None = None
 
     def length_at(self, data: bytearray, at: int) -> int:
@@ -43,7 +45,7 @@ class SbgDecoder(FramedDecoder):
         """Whether the end byte and the checksum, which covers the bytes from the message number on, are right."""
         end = at + length
         told = data[end - 3] | data[end - 2] << 8
-        return data[end - 1] == _END and CHECKSUM_OF["crc16-kermit"](bytes(data[at + 2 : end - 3])) == told
+        return data[end - 1] == _END and _check(bytes(data[at + 2 : end - 3])) == told
 
     def decode(self, frame: bytes) -> Frame | None:
         """The readings in SI, or None for another message."""
@@ -62,3 +64,13 @@ class SbgDecoder(FramedDecoder):
 
 
 SPOKEN = {SbgDecoder: "SBG Systems sbgECom, IMU data and IMU short"}
+
+
+def encode(sample: Sample) -> bytes:
+    """IMU data, followed by the increments that some firmware adds."""
+    body = _LAYOUTS[_DATA].pack(round(1e6 * sample.time_s) % 2**32, 0x37F, *sample.si, 25.1)
+    inner = struct.pack("<BBH", _DATA, _LOGS, len(body) + 24) + body + struct.pack("<6f", *sample.si)
+    return _SYNC + inner + struct.pack("<HB", _check(inner), _END)
+
+
+ENCODERS = {"sbg": encode}

@@ -5,7 +5,7 @@ Layout by the manufacturer's "MT Low Level Communication Protocol" (MT0101P); nu
 
 import struct
 
-from trihedron.capture.protocols.framing import MORE, Frame, FramedDecoder, triad
+from trihedron.protocols.framing import MORE, Frame, FramedDecoder, Sample, triad
 
 _SYNC = b"\xfa\xff\x36"
 _EXTENDED = 0xFF
@@ -113,3 +113,15 @@ def _packets(data: bytes | bytearray, at: int, length: int) -> Packets | None:
 
 
 SPOKEN = {Mtdata2Decoder: "Xsens MTData2 (acceleration, rate of turn, counter, sample time)"}
+
+
+def encode(sample: Sample) -> bytes:
+    """A message with packet counter, sample time, acceleration and rate of turn as floats."""
+    body = struct.pack(">HBH", _COUNTER, 2, sample.number % 65_536)
+    body += struct.pack(">HBI", _SAMPLE_TIME, 4, round(sample.time_s * 1e4) % 2**32)
+    body += struct.pack(">HB3f", 0x4020, 12, *sample.si[:3]) + struct.pack(">HB3f", 0x8020, 12, *sample.si[3:])
+    inner = _SYNC[1:] + bytes([len(body)]) + body
+    return _SYNC[:1] + inner + bytes([-sum(inner) & 0xFF])
+
+
+ENCODERS = {"xsens-mtdata2": encode}

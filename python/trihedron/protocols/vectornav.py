@@ -5,14 +5,14 @@ digits. Fields after the readings (pressure, a count that the user configured) a
 """
 
 import binascii
-from functools import reduce
-from operator import xor
 
-from trihedron.capture.protocols.framing import Frame, LineFedDecoder, printed_numbers, triad
+from trihedron.protocols.framing import CHECKSUMS, Frame, LineFedDecoder, Sample, printed_numbers, triad
 
 _BEFORE = {b"VNIMU": 0, b"VNMAR": 0, b"VNCMV": 0, b"VNYMR": 3, b"VNQMR": 4}
 """Kinds of lines, and the number of attitude fields before the magnetometer's."""
 _COLUMNS = ("mag_x", "mag_y", "mag_z", *triad("acc", "m/s^2"), *triad("gyr", "rad/s"))
+
+_, _xor = CHECKSUMS["xor8"]
 
 
 class VectorNavDecoder(LineFedDecoder):
@@ -50,7 +50,18 @@ def _checks(content: bytes, check: bytes) -> bool:
         value = int(check, 16)
     except ValueError:
         return False
-    return value == (binascii.crc_hqx(content, 0) if len(check) == 4 else reduce(xor, content, 0))
+    return value == (binascii.crc_hqx(content, 0) if len(check) == 4 else _xor(content))
 
 
 SPOKEN = {VectorNavDecoder: "VectorNav text lines $VNIMU, $VNYMR, $VNQMR, $VNMAR, $VNCMV"}
+
+
+def encode(sample: Sample) -> bytes:
+    """A line $VNIMU, with temperature and pressure behind the readings."""
+    numbers = [f"{v:+08.4f}" for v in (0.2, -0.1, 0.4)]
+    numbers += [f"{v:+07.3f}" for v in sample.si[:3]] + [f"{v:+010.6f}" for v in sample.si[3:]]
+    text = ",".join(["VNIMU", *numbers, "+25.1", "+101.325"]).encode()
+    return b"$%s*%02X\r\n" % (text, _xor(text))
+
+
+ENCODERS = {"vectornav": encode}

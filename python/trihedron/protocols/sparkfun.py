@@ -6,8 +6,8 @@ high byte first, readings of a ten-bit ADC. There is no checksum. Razor: one lin
 
 import struct
 
-from trihedron.capture.protocols.framing import Frame, FramedDecoder, LineFedDecoder, printed_numbers, triad
-from trihedron.capture.protocols.lines import LineColumns, LinesDecoder
+from trihedron.protocols.framing import Frame, FramedDecoder, LineFedDecoder, Sample, printed_numbers, triad
+from trihedron.protocols.lines import LineColumns, LinesDecoder
 
 _FRAME = struct.Struct(">x7Hx")
 _HIGHEST = 1023
@@ -115,3 +115,29 @@ SPOKEN = {
     SixDofTextDecoder: "SparkFun 6DOF v4, text lines A ... Z",
     RazorDecoder: "SparkFun Razor AHRS, text lines #A-R= #M-R= #G-R=",
 }
+
+
+def _six_dof(sample: Sample) -> list[int]:
+    """Count and readings; the protocol sends pitch before roll: the gyro's y before its x."""
+    x, y, z, roll, pitch, yaw = sample.raw
+    readings = (min(max(round(v), 0), _HIGHEST) for v in (x, y, z, pitch, roll, yaw))
+    return [sample.number % _COUNT_MODULUS, *readings]
+
+
+def encode_frame(sample: Sample) -> bytes:
+    """A binary frame."""
+    return b"A" + _FRAME.pack(*_six_dof(sample))[1:-1] + b"Z"
+
+
+def encode_text(sample: Sample) -> bytes:
+    """A line of text."""
+    return ("A\t" + "\t".join(map(str, _six_dof(sample))) + "\tZ\r\n").encode()
+
+
+def encode_razor(sample: Sample) -> bytes:
+    """The three lines of a sample."""
+    lines = (("A", sample.raw[:3]), ("M", (101.0, -33.0, 240.5)), ("G", sample.raw[3:]))
+    return b"".join((f"#{tag}-R=" + ",".join(f"{v:.2f}" for v in values) + "\r\n").encode() for tag, values in lines)
+
+
+ENCODERS = {"sparkfun-6dof": encode_frame, "sparkfun-6dof-text": encode_text, "razor": encode_razor}

@@ -4,8 +4,9 @@ import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
-from trihedron.capture.protocols.framing import DAY_MS, Frame, LineFedDecoder, printed_numbers
+from trihedron.protocols.framing import DAY_MS, Frame, LineFedDecoder, Sample, printed_numbers
 
 LEARN_LINES = 12
 """Lines of numbers from which the layout is learned."""
@@ -240,3 +241,34 @@ def _fields_of_numbers(line: str) -> int:
 
 
 SPOKEN = {LinesDecoder: "text: comma, semicolon, tab or blanks; labels ax:1,ay:2; a monitor's time in front"}
+
+
+HEADERS = {"lines": "count,time [us],ax,ay,az,gx,gy,gz\r\n", "lines-space": "micros ax ay az gx gy gz\r\n"}
+"""Header line that a simulated board prints once when it starts."""
+_NAMES = ("ax", "ay", "az", "gx", "gy", "gz")
+
+
+def encode(sample: Sample, *, style: str) -> bytes:
+    """A line in one of six styles."""
+    n, micros = str(sample.number), str(round(sample.time_s * 1e6))
+    numbers = [str(int(v)) if float(v).is_integer() else f"{v:.6g}" for v in sample.raw]
+    if style == "comma":
+        text = ",".join([n, micros, *numbers])
+    elif style == "space":
+        text = " ".join([micros, *numbers])
+    elif style == "bare":
+        text = ",".join(numbers)
+    elif style == "label":
+        text = ",".join(f"{k}:{v}" for k, v in zip(("n", *_NAMES), (n, *numbers), strict=True))
+    elif style == "equals":
+        text = " | ".join(f"{k[0]}{k[1].upper()} = {v}" for k, v in zip(_NAMES, numbers, strict=True))
+        text = f"seq = {n} | {text}"
+    else:
+        ms = 36_000_000 + round(sample.time_s * 1e3)
+        clock = f"{ms // 3_600_000:02d}:{ms // 60_000 % 60:02d}:{ms // 1000 % 60:02d}.{ms % 1000:03d}"
+        text = f"{clock} -> " + "\t".join(numbers)
+    return (text + "\r\n").encode()
+
+
+STYLES = ("space", "bare", "label", "equals", "monitor")
+ENCODERS = {"lines": partial(encode, style="comma"), **{f"lines-{one}": partial(encode, style=one) for one in STYLES}}
