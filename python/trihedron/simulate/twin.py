@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from scipy.spatial.transform import Rotation
 
-from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
@@ -19,7 +17,8 @@ from trihedron.records.channel_facts import ChannelFacts
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
-from trihedron.simulate.motion.attitude import attitude_with_up, shortest_turn, unit
+from trihedron.simulate.motion.attitude import VERTICAL, attitude_with_up, rotation_of, shortest_turn, unit
+from trihedron.simulate.motion.plan import attitudes_of_replay
 from trihedron.simulate.motion.steps import Motion, Pose, Quaternion, Replay, Step
 from trihedron.simulate.readout import Adc, matrix3, sense_axes, triple
 from trihedron.simulate.scenario import Clock, Environment, Scenario
@@ -97,7 +96,7 @@ def _motion(
         if not is_last:
             turning = _ending_in(turning, attitude, stop_s - end[i], ups[i + 1])
         path = _attitudes(turning, attitude, stop_s - end[i])
-        acceleration = np.einsum("nij,nj->ni", _matrices(path), f) - [0.0, 0.0, g]
+        acceleration = np.einsum("nij,nj->ni", rotation_of(path).as_matrix(), f) - [0.0, 0.0, g]
         acceleration[0] = 0.0
         if not is_last:
             acceleration[-1] = 0.0
@@ -115,12 +114,8 @@ def _at(knots: FloatArray, time_s: FloatArray, values: FloatArray) -> FloatArray
 
 def _attitudes(rate: FloatArray, start: Quaternion, duration_s: float) -> FloatArray:
     """(m, 4) attitude quaternion at every knot of a replay; ``rate`` (m, 3) [rad/s]."""
-    row = np.array([[0.0, duration_s, *start, 1.0, 0.0, 0.0, 0.0, 0.5, *[0.0] * 6, 0.5]])
-    knots = np.column_stack([np.zeros(len(rate)), rate, np.zeros_like(rate)])
-    empty = np.zeros((0, 6))
-    t = np.linspace(0.0, duration_s, len(rate))
-    q, *_ = _core.simulate_motion(row, empty, empty, knots, t, 0.0, (0.0, 0.0, 0.0))
-    return q
+    row = [0.0, duration_s, *start, 1.0, 0.0, 0.0, 0.0, 0.5, *[0.0] * 6, 0.5]
+    return attitudes_of_replay(row, np.column_stack([np.zeros(len(rate)), rate, np.zeros_like(rate)]))
 
 
 def _ending_in(rate: FloatArray, start: Quaternion, duration_s: float, up: FloatArray) -> FloatArray:
@@ -129,8 +124,8 @@ def _ending_in(rate: FloatArray, start: Quaternion, duration_s: float, up: Float
     If ω makes the attitude R(t), then ω + R(t)ᵀ c makes exp(c t) R(t), exactly; c [rad/s] is level and small.
     """
     for _ in range(3):
-        R = _matrices(_attitudes(rate, start, duration_s))
-        c = shortest_turn(unit(R[-1] @ up), np.array([0.0, 0.0, 1.0])) / duration_s
+        R = rotation_of(_attitudes(rate, start, duration_s)).as_matrix()
+        c = shortest_turn(unit(R[-1] @ up), VERTICAL) / duration_s
         rate = rate + R.transpose(0, 2, 1) @ c
     return rate
 
@@ -144,11 +139,6 @@ def _coming_to_rest(acceleration: FloatArray) -> FloatArray:
     m = len(acceleration)
     hump = np.sin(np.pi * np.arange(m) / (m - 1)) ** 2
     return np.asarray(acceleration - hump[:, None] * (acceleration.sum(axis=0) / hump.sum()))
-
-
-def _matrices(q: FloatArray) -> FloatArray:
-    """(m, 3, 3) body-to-level rotation matrices of quaternions (m, 4)."""
-    return Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix()
 
 
 def _filled(raw: FloatArray) -> FloatArray:

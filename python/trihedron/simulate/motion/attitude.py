@@ -1,58 +1,32 @@
-"""Attitudes as unit quaternions (w, x, y, z) from the body frame to the level frame."""
+"""Attitudes: rotations from the body frame to the level frame, stored as unit quaternions (w, x, y, z)."""
 
 import math
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.simulate.motion.steps import LEVEL, Quaternion
+from trihedron.simulate.motion.steps import Quaternion
+
+VERTICAL = np.array([0.0, 0.0, 1.0])
 
 
-def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Hamilton product pq, normalised: the rotation q followed by p."""
-    a, b, c, d = p
-    e, f, g, h = q
-    w = a * e - b * f - c * g - d * h
-    x = a * f + b * e + c * h - d * g
-    y = a * g - b * h + c * e + d * f
-    z = a * h + b * g - c * f + d * e
-    norm = math.sqrt(w * w + x * x + y * y + z * z)
-    return (w / norm, x / norm, y / norm, z / norm)
+def rotation_of(q: npt.ArrayLike) -> Rotation:
+    """Body-to-level rotations of quaternions (4,) or (m, 4)."""
+    return Rotation.from_quat(np.roll(q, -1, axis=-1))
 
 
-def quaternion_from_vector(v: npt.ArrayLike) -> Quaternion:
-    """Rotation by |v| [rad] about v (3,)."""
-    x, y, z = (float(c) for c in np.asarray(v, dtype=np.float64))
-    angle = math.sqrt(x * x + y * y + z * z)
-    if angle == 0.0:
-        return LEVEL
-    s = math.sin(0.5 * angle) / angle
-    return (math.cos(0.5 * angle), s * x, s * y, s * z)
-
-
-def vector_from_quaternion(q: Quaternion) -> FloatArray:
-    """Rotation vector (3,) [rad], of angle at most π."""
-    w, *xyz = q
-    v = np.array(xyz)
-    n = float(np.linalg.norm(v))
-    if n < 1e-12:
-        return 2.0 * v
-    if w < 0.0:
-        w, v = -w, -v
-    return v * (2.0 * math.atan2(n, w) / n)
-
-
-def up_in_body(q: Quaternion) -> FloatArray:
-    """Direction of the vertical in the body frame (3,): the third row of the body-to-level matrix."""
-    w, x, y, z = q
-    return np.array([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)])
+def quaternion_of(rotation: Rotation) -> Quaternion:
+    """The quaternion of a rotation."""
+    x, y, z, w = rotation.as_quat().tolist()
+    return (w, x, y, z)
 
 
 def attitude_with_up(up: npt.ArrayLike) -> Quaternion:
     """An attitude, by the shortest rotation from level, in which the body direction ``up`` (3,) points up."""
-    return quaternion_product(LEVEL, quaternion_from_vector(shortest_turn(unit(up), np.array([0.0, 0.0, 1.0]))))
+    return quaternion_of(Rotation.from_rotvec(shortest_turn(unit(up), VERTICAL)))
 
 
 def unit(v: npt.ArrayLike) -> FloatArray:

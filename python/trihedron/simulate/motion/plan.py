@@ -4,26 +4,19 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records.truth import SegmentKind
-from trihedron.simulate.motion.attitude import (
-    quaternion_from_vector,
-    quaternion_product,
-    shortest_turn,
-    unit,
-    up_in_body,
-    vector_from_quaternion,
-)
+from trihedron.simulate.motion.attitude import VERTICAL, quaternion_of, rotation_of, shortest_turn, unit
 from trihedron.simulate.motion.steps import (
     NOWHERE,
     Motion,
     MoveTo,
     Oscillate,
     Pose,
-    Quaternion,
     Replay,
     Step,
     Turn,
@@ -82,9 +75,9 @@ class _Planner:
     """Appends steps to the tables and tracks time and attitude."""
 
     def __init__(self, motion: Motion, rng: np.random.Generator) -> None:
-        tilt = [radians_from_degrees(motion.table_tilt_deg[0]), radians_from_degrees(motion.table_tilt_deg[1]), 0.0]
-        self.tilt = quaternion_from_vector(tilt)
-        self.attitude = quaternion_product(self.tilt, motion.start)
+        # The steps refer to the tilted table.
+        self.tilt = Rotation.from_rotvec([*motion.table_tilt_deg, 0.0], degrees=True)
+        self.attitude = self.tilt * rotation_of(motion.start)
         self.time = 0.0
         self.rng = rng
         self.rows: list[list[float]] = []
@@ -114,13 +107,14 @@ class _Planner:
             axis, signed = -axis, -angle
         else:
             signed = angle
-        row = [self.time, duration_s, *self.attitude, *axis, signed, ramp, *travel, *arm, fade]
+        row = [self.time, duration_s, *quaternion_of(self.attitude), *axis, signed, ramp, *travel, *arm, fade]
         self.rows.append(row)
         stop = self.time + duration_s
         label_axis = (float(axis[0]), float(axis[1]), float(axis[2])) if angle > 0.0 else NOWHERE
         self.labels.append(Label(kind, name, self.time, stop, label_axis, signed))
         self.time = stop
-        self.attitude = quaternion_product(self.attitude, quaternion_from_vector(vector))
+        if angle > 0.0:
+            self.attitude = self.attitude * Rotation.from_rotvec(vector)
         return len(self.rows) - 1
 
     def add_wobble(self, segment: int, size_deg: float, frequency_hz: float) -> None:
@@ -137,9 +131,10 @@ class _Planner:
             self.add("pose", step.name, step.duration_s, creep if step.settling_deg else None, ramp=0.05)
         elif isinstance(step, MoveTo):
             # R' = R exp(v) has `up` vertical if exp(v) rotates `up` to the old vertical in the body frame.
-            turn = quaternion_from_vector(shortest_turn(unit(step.up), up_in_body(self.attitude_above_table())))
-            heading = quaternion_from_vector(radians_from_degrees(step.heading_deg) * unit(step.up))
-            rotation = vector_from_quaternion(quaternion_product(turn, heading))
+            vertical = (self.attitude.inv() * self.tilt).apply(VERTICAL)
+            turn = Rotation.from_rotvec(shortest_turn(unit(step.up), vertical))
+            heading = Rotation.from_rotvec(radians_from_degrees(step.heading_deg) * unit(step.up))
+            rotation = (turn * heading).as_rotvec()
             k = self.add("move", step.name, step.duration_s, rotation, step.ramp, step.travel_m, step.arm_m)
             self.add_wobble(k, step.wobble_deg, step.wobble_hz)
         elif isinstance(step, Turn):
@@ -171,7 +166,7 @@ class _Planner:
             k = self.add("move", step.name, step.duration_s, arm=step.arm_m)
             knots = np.column_stack([np.full(len(step.rate_rad_s), float(k)), step.rate_rad_s, step.acceleration_m_s2])
             self.replay.append(knots)
-            self.attitude = self.end_of_replay(knots)
+            self.attitude = rotation_of(attitudes_of_replay(self.rows[-1], knots)[-1])
         else:
             k = self.add("disturbance", step.name, step.duration_s)
             self.add_wobble(k, step.tilt_deg, step.frequency_hz)
@@ -179,20 +174,14 @@ class _Planner:
                 shift = step.shift_m * self.rng.normal(size=3)
                 self.shake.append([k, *shift, step.frequency_hz, self.rng.uniform(0.0, 2.0 * math.pi)])
 
-    def end_of_replay(self, knots: FloatArray) -> Quaternion:
-        """Attitude at the end of the last row, which is a replay."""
-        alone = knots.copy()
-        alone[:, 0] = 0.0
-        empty = np.zeros((0, 6))
-        end = np.array([self.time])
-        q, *_ = _core.simulate_motion(np.array([self.rows[-1]]), empty, empty, alone, end, 0.0, NOWHERE)
-        w, x, y, z = q[0].tolist()
-        return (w, x, y, z)
 
-    def attitude_above_table(self) -> Quaternion:
-        """Attitude relative to the tilted table, to which the steps refer."""
-        w, x, y, z = self.tilt
-        return quaternion_product((w, -x, -y, -z), self.attitude)
+def attitudes_of_replay(row: list[float], knots: FloatArray) -> FloatArray:
+    """(m, 4) attitude at every knot (m, 7) of a segment alone, which is a replay."""
+    alone, empty = knots.copy(), np.zeros((0, 6))
+    alone[:, 0] = 0.0
+    t = row[0] + np.linspace(0.0, row[1], len(knots))
+    q, *_ = _core.simulate_motion(np.array([row]), empty, empty, alone, t, 0.0, NOWHERE)
+    return q
 
 
 def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
