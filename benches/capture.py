@@ -82,7 +82,7 @@ def faults(frames: str = "1e5", kinds: str = "1%", *only: str) -> None:
         missing = sent.frames - rows - count.lost
         total += (sent.frames, missing)
         account = f"sent {sent.frames:8d} = saved {rows:8d} + lost {count.lost:6d} + {missing}"
-        print(f"{board:20s} {account} (corrupt pieces {count.corrupt}, {count.tally})", flush=True)
+        print(f"{board:20s} {account} (corrupt pieces {count.corrupt}, {count})", flush=True)
     print(f"{total[0]} frames; not accounted for: {total[1]}")
 
 

@@ -11,7 +11,6 @@ import trihedron
 from board import DECLARED, counts_recording
 from trihedron.api.capturing import column_namer
 from trihedron.capture.sequence import Sequence
-from trihedron.capture.timeline import Count
 from trihedron.cli import main
 from trihedron.protocols import decoder_factory, encoder_for
 from trihedron.protocols.declared import read_frame_declaration
@@ -57,7 +56,7 @@ def sequenced(numbers, modulus, rate_hz=0.0, text=str):
         arrival = number / rate_hz if rate_hz else 0.0
         placed += sequence.push([Frame(number % modulus, None, (0.0,), text(number))], arrival)
     placed += sequence.finish()
-    return sequence.tally, placed
+    return sequence.count, placed
 
 
 def stream(protocol, declaration, n, rate_hz, faults):
@@ -103,27 +102,27 @@ def test_sent_is_saved_plus_lost_under_every_fault(board, name, rate_hz, declara
     modulus = decoder.counter_modulus if by_counter else decoder.clock_modulus
     sequence = Sequence(by_counter=by_counter, by_clock=by_clock, modulus=modulus, tick_s=decoder.tick_s)
     placed = sequence.push(frames, 0.0) + sequence.finish()
-    assert sequence.tally.saved == len(placed)
+    assert sequence.count.saved == len(placed)
     # Frames before the first and after the last one saved are nobody's to count: at most a few.
-    assert 0 <= n - (sequence.tally.saved + sequence.tally.lost) <= 5
-    assert sequence.tally.restarts == 0
+    assert 0 <= n - (sequence.count.saved + sequence.count.lost) <= 5
+    assert sequence.count.restarts == 0
     # A frame that no fault touched is not lost, but for the neighbour of a cut one whose bytes it merged with.
-    assert sequence.tally.saved >= len(sent.untouched) - sent.faults["cut"] - sent.faults["byte_lost"]
+    assert sequence.count.saved >= len(sent.untouched) - sent.faults["cut"] - sent.faults["byte_lost"]
 
 
 def test_a_garbled_counter_is_not_a_thousand_lost_frames_and_one_that_begins_anew_a_restart():
-    tally, placed = sequenced([*range(10), 5010, *range(11, 20)], 1 << 16)
-    assert (tally.lost, tally.garbled) == (1, 1)
+    count, placed = sequenced([*range(10), 5010, *range(11, 20)], 1 << 16)
+    assert (count.lost, count.garbled) == (1, 1)
     assert [one.place for one in placed] == [*range(10), *range(11, 20)]
-    tally, _ = sequenced([*range(1000, 1050), *range(5, 60)], 1 << 32)
-    assert (tally.saved, tally.lost, tally.restarts) == (105, 0, 1)
+    count, _ = sequenced([*range(1000, 1050), *range(5, 60)], 1 << 32)
+    assert (count.saved, count.lost, count.restarts) == (105, 0, 1)
 
 
 @pytest.mark.parametrize(("modulus", "uncounted"), [(1 << 8, 1), (1 << 16, 0)])
 def test_what_a_short_counter_counts_over_a_long_pause_is_a_lower_bound(modulus, uncounted):
-    tally, _ = sequenced([*range(500), *range(850, 900)], modulus, rate_hz=1000.0)
+    count, _ = sequenced([*range(500), *range(850, 900)], modulus, rate_hz=1000.0)
     # 350 frames are missing; a counter of one byte has gone round once and shows 94 of them.
-    assert (tally.lost, tally.uncounted) == (350 - 256 * uncounted, uncounted)
+    assert (count.lost, count.uncounted) == (350 - 256 * uncounted, uncounted)
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, 1000.0])
@@ -131,16 +130,16 @@ def test_what_a_short_counter_counts_over_a_long_pause_is_a_lower_bound(modulus,
 def test_new_frames_whose_short_counter_looks_like_a_stretch_sent_twice_are_kept(lost, rate_hz):
     # Where time says how much is missing, readings may even be those of before.
     numbers = [*range(500), *range(500 + lost, 580 + lost)]
-    tally, _ = sequenced(numbers, 256, rate_hz, text=(lambda _: "still") if rate_hz else str)
-    assert tally.saved == len(numbers)
+    count, _ = sequenced(numbers, 256, rate_hz, text=(lambda _: "still") if rate_hz else str)
+    assert count.saved == len(numbers)
     # What is missing cannot be counted, and that is said.
-    assert Count(tally, counted_by="counter").is_least
+    assert count.is_least
 
 
 def test_a_stretch_that_was_sent_twice_is_saved_once():
-    tally, placed = sequenced([*range(500), *range(470, 600)], 256)
+    count, placed = sequenced([*range(500), *range(470, 600)], 256)
     assert [one.frame.text for one in placed] == list(map(str, range(600)))
-    assert (tally.repeated, tally.lost, tally.restarts) == (30, 0, 0)
+    assert (count.repeated, count.lost, count.restarts) == (30, 0, 0)
 
 
 @pytest.mark.parametrize("modulus", [0, 1 << 16, 1 << 32])
@@ -150,7 +149,7 @@ def test_a_clock_that_wraps_or_stutters_loses_nothing(modulus):
     sequence = Sequence(by_clock=True, modulus=modulus, tick_s=1e-3)
     sequence.push([Frame(None, t, (0.0,), str(i)) for i, t in enumerate(ticks)], 0.0)
     sequence.finish()
-    assert (sequence.tally.saved, sequence.tally.lost, sequence.tally.restarts) == (5000, 0, 0)
+    assert (sequence.count.saved, sequence.count.lost, sequence.count.restarts) == (5000, 0, 0)
 
 
 def test_checksums_have_their_published_check_values():

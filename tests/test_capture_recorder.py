@@ -61,12 +61,12 @@ def test_any_stream_of_bytes_is_a_source(where, tmp_path):
     if where == "tcp":
         with Board(recording, "xio", tcp=True) as board:
             recorder, _ = capture(board.port, log, wait_for_return_s=0.0)
-        assert recorder.count.tally.saved == 300
+        assert recorder.count.saved == 300
         return
     raw = sent(tmp_path / "raw.txt", recording, "lines")
     if where == "file":
         recorder, _ = capture(raw, log)
-        assert recorder.count.tally.saved == 300
+        assert recorder.count.saved == 300
     else:
         command = [sys.executable, "-m", "trihedron", "capture", "-", "-o", str(log)]
         subprocess.run(command, input=Path(raw).read_bytes(), check=True, capture_output=True, timeout=60)
@@ -81,7 +81,7 @@ def test_losses_stand_in_the_log_where_they_were(tmp_path):
     frames = [piece for _, piece in Device(counts_recording(200, 100.0), "sparkfun-6dof").pieces(Sent())]
     raw.write_bytes(b"".join(frames[:50] + frames[53:120] + frames[121:]))
     recorder, blocks = capture(str(raw), tmp_path / "log.csv", rate_hz=100.0)
-    assert (recorder.count.tally.saved, recorder.count.lost) == (196, 4)
+    assert (recorder.count.saved, recorder.count.lost) == (196, 4)
     remarks = [line for line in (tmp_path / "log.csv").read_text().splitlines() if "lost" in line and "before" in line]
     assert [re.findall(r"lost (\d+) before frame (\d+)", line)[0] for line in remarks] == [("3", "53"), ("1", "121")]
     # The time of what follows a loss is right: the hole is in the time column.
@@ -145,7 +145,7 @@ def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads_and_a_slow_disk_l
     assert recorder.count.lost == 0
     back = trihedron.read(tmp_path / "log.csv")
     # The start may be lost to the reader that was not there yet; what is saved is in steps of the board's clock.
-    assert back.n_samples == n == recorder.count.tally.saved > 300
+    assert back.n_samples == n == recorder.count.saved > 300
     assert np.allclose(np.diff(back.time_s), 0.001, atol=1e-9)
     assert back.auxiliary.keys() >= {"host_s", "frame", "device_ticks"}
     assert f"# frames: {n} saved / 0 lost" in (tmp_path / "log.csv").read_text()
@@ -218,7 +218,7 @@ def test_a_silent_board_is_told_from_a_wrong_protocol_and_a_busy_port_is_named()
 def test_what_a_board_says_at_start_is_no_frame(tmp_path):
     raw = sent(tmp_path / "raw.txt", counts_recording(100, 100.0), "lines-label", parse_faults("text"))
     recorder, _ = capture(raw, tmp_path / "log.csv")
-    assert recorder.count.tally.saved == 100
+    assert recorder.count.saved == 100
     assert recorder.count.corrupt <= 1
 
 

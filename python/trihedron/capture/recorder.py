@@ -3,7 +3,7 @@
 import queue
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostE
 from trihedron.capture.reading import ReadingThread, Rows, SourceReturned, Stopped
 from trihedron.capture.sequence import Placed, Sequence
 from trihedron.capture.sources import Source
-from trihedron.capture.timeline import Count, Tally, Timeline, clock_sentence
+from trihedron.capture.timeline import Count, Timeline, clock_sentence
 from trihedron.protocols.framing import Decoder
 
 SETTLE_S = 0.6
@@ -78,7 +78,6 @@ class Recorder:
         self._sequence: Sequence | None = None
         self._timeline: Timeline | None = None
         self._new_connection = True
-        self._past = (0, 0, Tally())  # counts of earlier connections
         self._before: Sequence | None = None  # sequence of the previous connection
         self._first_host_s = self._last_host_s = 0.0
         self._held: list[Placed] = []
@@ -162,8 +161,9 @@ class Recorder:
             decoder, first = self._decoder, frames[0]
             by_counter, by_clock = first.counter is not None, first.ticks is not None
             modulus = decoder.counter_modulus if by_counter else decoder.clock_modulus
-            self._sequence = Sequence(by_counter=by_counter, by_clock=by_clock, modulus=modulus, tick_s=decoder.tick_s)
-            self.count.counted_by = "counter" if by_counter else "clock" if by_clock else "nothing"
+            self._sequence = Sequence(
+                by_counter=by_counter, by_clock=by_clock, modulus=modulus, tick_s=decoder.tick_s, count=self.count
+            )
             if self._timeline is None:
                 tick = decoder.tick_s if by_clock else 0.0
                 self._timeline = Timeline(tick_s=tick, modulus=decoder.clock_modulus, nominal_rate_hz=self._rate_hz)
@@ -223,15 +223,14 @@ class Recorder:
         self._first_host_s = first.host_s
         if before is None:
             return 0
-        rate_hz = (before.tally.saved + before.tally.lost) / max(self._last_host_s - start_s, SETTLE_S)
+        rate_hz = before.n_frames / max(self._last_host_s - start_s, SETTLE_S)
         most = int(AWAY_MARGIN * rate_hz * (first.host_s - self._last_host_s)) + AWAY_FRAMES
         missing = before.missing_until(first.frame, most)
         if missing is None:
             self._rows.say("how many frames were lost while it was away is not known from what the device sends")
-            self._past = (*self._past[:2], replace(self._past[2], uncounted=self._past[2].uncounted + 1))
+            self.count.uncounted += 1
             return 0
-        earlier = self._past[2]
-        self._past = (*self._past[:2], replace(earlier, lost=earlier.lost + missing))
+        self.count.missing += missing
         return missing
 
     def _part(self, host_s: float) -> Iterator[Block]:
@@ -241,26 +240,16 @@ class Recorder:
         if self._sequence is not None:
             placed += self._sequence.finish()
         yield from self._emit(placed, host_s, is_last=True)
-        self._count_now()
-        self._past = (self.count.corrupt, self.count.skipped_bytes, self.count.tally)
         if self._sequence is not None:
             self._before = self._sequence
         self._decoder, self._sequence = self._make(), None
-        if decoder.columns:
-            # The columns of the log stay: a decoder that learns them must not learn others.
-            for name in decoder.learned:
-                setattr(self._decoder, name, getattr(decoder, name))
+        # The columns of the log stay: a decoder that learns them must not learn others.
+        for name in ("corrupt", "skipped_bytes", *(decoder.learned if decoder.columns else ())):
+            setattr(self._decoder, name, getattr(decoder, name))
         self._new_connection, self._held_since_s = True, None
 
-    def _count_now(self) -> None:
-        corrupt, skipped, past = self._past
-        self.count.corrupt = corrupt + self._decoder.corrupt
-        self.count.skipped_bytes = skipped + self._decoder.skipped_bytes
-        now = self._sequence.tally if self._sequence is not None else Tally()
-        self.count.tally = Tally(*(getattr(past, name) + getattr(now, name) for name in Tally.__dataclass_fields__))
-
     def _say_facts(self) -> None:
-        self._count_now()
+        self.count.corrupt, self.count.skipped_bytes = self._decoder.corrupt, self._decoder.skipped_bytes
         if self._timeline is not None and self.source.is_live:
             self.clock = self._timeline.fit.line() or self.clock
         self._rows.say_facts(self.count, self.clock, self._timeline)

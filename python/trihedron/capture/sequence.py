@@ -9,7 +9,7 @@ from itertools import pairwise
 from statistics import median
 from typing import NamedTuple
 
-from trihedron.capture.timeline import Tally
+from trihedron.capture.timeline import Count
 from trihedron.protocols.framing import Frame
 
 LEARN = 8
@@ -57,10 +57,19 @@ class Placed(NamedTuple):
 class Sequence:
     """Assigns an index to every frame, by counter or clock; without both, frames are consecutive.
 
-    ``modulus`` is the value at which counter or clock wraps (0: it does not), ``tick_s`` one tick of the clock [s].
+    ``modulus`` is the value at which counter or clock wraps (0: it does not), ``tick_s`` one tick of the clock [s];
+    ``count`` is added to.
     """
 
-    def __init__(self, *, by_counter: bool = False, by_clock: bool = False, modulus: int = 0, tick_s: float = 0.0):
+    def __init__(
+        self,
+        *,
+        by_counter: bool = False,
+        by_clock: bool = False,
+        modulus: int = 0,
+        tick_s: float = 0.0,
+        count: Count | None = None,
+    ) -> None:
         self._by_counter, self._by_clock = by_counter, by_clock and not by_counter
         self._modulus = modulus
         self._tick_s = tick_s
@@ -73,7 +82,13 @@ class Sequence:
         self._index = -1
         self._waiting: list[tuple[float, Frame]] = []
         self._first_host_s = self._last_host_s = 0.0
-        self.tally = Tally()
+        self.count = Count() if count is None else count
+        self.count.counted_by = "counter" if by_counter else "clock" if by_clock else "nothing"
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames up to the last one placed, lost ones included."""
+        return self._index + 1
 
     def push(self, frames: list[Frame], host_s: float) -> list[Placed]:
         """Place frames that arrived at ``host_s`` of the host's clock; some may wait for later ones."""
@@ -82,12 +97,12 @@ class Sequence:
             for frame in frames:
                 self._index += 1
                 out.append(Placed(self._index, 0, False, host_s, frame))
-            self.tally.saved += len(out)
+            self.count.saved += len(out)
             return out
         for frame in frames:
             before = self._waiting[-1][1] if self._waiting else self._placed[-1] if self._placed else None
             if frame == before and not self.is_coarse:
-                self.tally.repeated += 1
+                self.count.repeated += 1
                 continue
             self._waiting.append((host_s, frame))
             if self._last is None or (self._by_clock and self._period == 0.0):
@@ -189,7 +204,7 @@ class Sequence:
         # Start with the first frame that one of the next three continues.
         steps = [[self._steps(a, b) for b in keys[i + 1 : i + 4]] for i, a in enumerate(keys)]
         first = next((i for i, ahead in enumerate(steps) if any(0 < s <= 4 for s in ahead)), 0)
-        self.tally.garbled += first
+        self.count.garbled += first
         del self._waiting[:first]
         self._accept(1, out)
         rest, self._waiting = self._waiting, []
@@ -247,20 +262,20 @@ class Sequence:
         _, frame = self._waiting.pop(0)
         assert self._last is not None
         if self._difference(self._last, self._key(frame)) == 0:
-            self.tally.repeated += 1
+            self.count.repeated += 1
         else:
-            self.tally.garbled += 1
+            self.count.garbled += 1
 
     def _restart(self, n: int, ahead: int, out: list[Placed]) -> None:
         """Three consecutive frames show that the counter restarted, or that a section was sent twice."""
         is_behind = -SENT_TWICE <= ahead <= 0 and not self._may_have_wrapped(self._waiting[-1][0])
         if is_behind and any(frame in self._placed for _, frame in self._waiting):
-            self.tally.repeated += len(self._waiting)
+            self.count.repeated += len(self._waiting)
             self._waiting.clear()
             return
         for _ in range(n):
             self._drop()
-        self.tally.restarts += 1
+        self.count.restarts += 1
         self._accept(1, out, restarted=True)
         while self._waiting:
             self._accept(1, out)
@@ -285,6 +300,8 @@ class Sequence:
     def _accept(self, ahead: int, out: list[Placed], *, restarted: bool = False) -> None:
         """Place the first waiting frame, ``ahead`` steps after the last placed one."""
         host_s, frame = self._waiting.pop(0)
+        if self.n_frames == 0:
+            self._first_host_s = host_s
         self._index += ahead
         key = self._key(frame)
         if self._by_clock and self._last is not None:
@@ -294,18 +311,16 @@ class Sequence:
             else:
                 # The step is filtered slowly, the phase faster; the effect of one timestamp on the step is limited.
                 limit = 0.3 * self._period
-                gain = max(1e-3, 1.0 / (LEARN + self.tally.saved))
+                gain = max(1e-3, 1.0 / (LEARN + self.n_frames))
                 self._period += gain * min(max(surprise / ahead, -limit), limit)
                 self._late = 0.8 * surprise
         self._last = key
         self._placed.append(frame)
         is_wrapped = ahead > 1 and self._may_have_wrapped(host_s)
-        if self.tally.saved == 0:
-            self._first_host_s = host_s
         self._last_host_s = host_s
-        self.tally.saved += 1
-        self.tally.lost += ahead - 1
-        self.tally.uncounted += is_wrapped
+        self.count.saved += 1
+        self.count.missing += ahead - 1
+        self.count.uncounted += is_wrapped
         out.append(Placed(self._index, ahead - 1, restarted, host_s, frame, is_wrapped))
 
     def _may_have_wrapped(self, host_s: float) -> bool:
@@ -313,7 +328,7 @@ class Sequence:
         span_s = self._last_host_s - self._first_host_s
         if not (self._by_counter and self._modulus and span_s > 0.0):
             return False
-        rate_hz = (self.tally.saved + self.tally.lost) / span_s
+        rate_hz = self.n_frames / span_s
         return (host_s - self._last_host_s) * rate_hz >= self._modulus // 2
 
 

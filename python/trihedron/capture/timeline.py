@@ -1,6 +1,6 @@
 """Time of every frame while it is recorded, and the summary of a capture."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from trihedron.arrivals import ClockFit, ClockLine
 
@@ -92,24 +92,17 @@ MOST_PPM = 20_000.0
 
 
 @dataclass
-class Tally:
-    """Counts of frames: ``lost`` are missing by the device's counter or clock; ``garbled`` were complete, but their
-    counter or timestamp contradicted their neighbours' (also counted as lost); ``repeated`` arrived twice. In
-    ``uncounted`` pauses more may be lost than counted."""
+class Count:
+    """Counts of a capture: ``saved`` frames, ``missing`` ones by the device's counter or clock; ``garbled`` were
+    complete, but their counter or timestamp contradicted their neighbours' (also counted as missing); ``repeated``
+    arrived twice. In ``uncounted`` pauses more may be lost than counted. ``corrupt`` pieces look like frames."""
 
     saved: int = 0
-    lost: int = 0
+    missing: int = 0
     garbled: int = 0
     repeated: int = 0
     restarts: int = 0
     uncounted: int = 0
-
-
-@dataclass
-class Count:
-    """Counts of frames, corrupt pieces, skipped bytes and disconnections of a capture."""
-
-    tally: Tally = field(default_factory=Tally)
     corrupt: int = 0
     skipped_bytes: int = 0
     n_bytes: int = 0
@@ -119,12 +112,12 @@ class Count:
     @property
     def lost(self) -> int:
         """Frames sent but not in the log: by counter or clock; without either, the number of corrupt pieces."""
-        return self.corrupt if self.counted_by == "nothing" else self.tally.lost
+        return self.corrupt if self.counted_by == "nothing" else self.missing
 
     @property
     def is_least(self) -> bool:
         """Whether ``lost`` is a lower bound: the counter restarted, or may have wrapped unnoticed in a pause."""
-        return self.counted_by != "nothing" and bool(self.tally.restarts or self.tally.uncounted)
+        return self.counted_by != "nothing" and bool(self.restarts or self.uncounted)
 
     def sentence(self) -> str:
         """The counts as one sentence, for the screen and the log's header."""
@@ -133,13 +126,13 @@ class Count:
             "clock": "by the device's clock",
             "nothing": "as far as remains were seen: there is no counter and no clock",
         }[self.counted_by]
-        parts = [f"{self.tally.saved} saved", f"{'at least ' if self.is_least else ''}{self.lost} lost {how}"]
+        parts = [f"{self.saved} saved", f"{'at least ' if self.is_least else ''}{self.lost} lost {how}"]
         for n, words in (
             (self.corrupt if self.counted_by != "nothing" else 0, "corrupt pieces seen"),
-            (self.tally.garbled, "with a garbled count"),
-            (self.tally.repeated, "repeated"),
+            (self.garbled, "with a garbled count"),
+            (self.repeated, "repeated"),
             (self.disconnections, "disconnections"),
-            (self.tally.restarts, "restarts of the device"),
+            (self.restarts, "restarts of the device"),
         ):
             if n:
                 parts.append(f"{n} {words}")

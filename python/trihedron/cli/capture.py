@@ -98,7 +98,7 @@ def capture(
             open_browser=not no_open,
             seconds=seconds,
         )
-    conclude(recorder, output, recorder.count.tally.saved, is_ended_well=made.is_done)
+    conclude(recorder, output, recorder.count.saved, is_ended_well=made.is_done)
     note_log(LogSource(log=output))
     finish(read(output), made.cut_s, place, calibration, force=force)
 
