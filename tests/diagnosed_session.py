@@ -6,15 +6,15 @@ from itertools import pairwise
 import numpy as np
 
 import trihedron
-from trihedron.simulate import hand_session, simulate
+from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
-from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
 
 
 def unit_of(motion, unit=1, grade="mpu", is_wide=False):
     """A scenario of one unit of a part; a wide one has the gyro's next range, which hand moves do not leave."""
-    scenario = _of(profile_by_name(grade), motion, "session", unit)
+    profile = profile_by_name(grade)
+    scenario = Scenario(motion, "session", *profile.unit(unit), profile.clock)
     if not is_wide:
         return scenario
     gyro = scenario.gyroscope

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Collection, Mapping, Sequence
+from importlib.resources import files
 from itertools import dropwhile
 from typing import Any
 
@@ -14,36 +15,8 @@ from trihedron.documents import read_text
 from trihedron.errors import InputError
 from trihedron.files.output import write_whole
 
-TEMPLATE = """# A simulation to begin with: an ordinary sensor that reads m/s² and rad/s, turned by hand.
-# What a file does not say is the profile's; every key is in the documentation, "Simulation".
-name = "my-sensor"
-profile = "mpu"
-
-[environment]
-gravity_m_s2 = 9.80665
-
-[session]
-kind = "hand"
-
-[clock]
-rate_hz = 100.0
-
-[accelerometer]
-unit = "m/s^2"
-S = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-b = [0, 0, 0]
-
-[accelerometer.adc]
-lsb = 0
-
-[gyroscope]
-unit = "rad/s"
-S = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-b = [0, 0, 0]
-
-[gyroscope.adc]
-lsb = 0
-"""
+TEMPLATE = files("trihedron.files").joinpath("template.toml").read_text(encoding="utf-8")
+"""A scenario to begin with."""
 
 
 def improved_scenario(

@@ -18,9 +18,9 @@ from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion.attitude import attitude_with_up
 from trihedron.simulate.motion.steps import LEVEL, Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate
-from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.scenario import Clock, Environment, Scenario
+from trihedron.simulate.sessions import SESSIONS
 
 _STEPS: dict[str, type[Any]] = {
     "pose": Pose,
@@ -30,7 +30,7 @@ _STEPS: dict[str, type[Any]] = {
     "vibrate": Vibrate,
     "disturb": Disturb,
 }
-_TOP = ("name", "profile", "unit", "session", "start_up", "table_tilt_deg", "step", "clock", "environment")
+_TOP = ("name", "about", "profile", "unit", "session", "start_up", "table_tilt_deg", "step", "clock", "environment")
 _KEYS = (*_TOP, "accelerometer", "gyroscope", "effect")
 
 

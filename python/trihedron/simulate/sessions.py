@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -169,3 +169,26 @@ def rate_table(
 def long_static(duration_s: float = 3600.0, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Motion:
     """One static pose, for Allan variance."""
     return Motion((Pose(duration_s, name="static"),), start=attitude_with_up(up))
+
+
+def manual_session() -> Motion:
+    """The laboratory manual's: six faces and twelve edges, then turns by ±8π on three faces."""
+    poses = poses_in_order([*FACES, *EDGES], pose_s=6.0, move_s=3.0, wobble_deg=4.0)
+    steps = list(poses.steps)
+    for face in FACES[::2]:
+        steps += poses_in_order([face], pose_s=4.0, move_s=3.0, arrive=True).steps
+        for angle in (1440.0, -1440.0):
+            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Pose(4.0, "static")]
+    return Motion(tuple(steps), start=poses.start)
+
+
+SESSIONS: dict[str, Callable[..., Motion]] = {
+    "hand": hand_session,
+    "six-faces": six_faces,
+    "table-turns": table_turns,
+    "dividing-head": dividing_head,
+    "rate-table": rate_table,
+    "manual": manual_session,
+    "static": long_static,
+}
+"""Sessions that a scenario file can name, and the functions that make them."""
