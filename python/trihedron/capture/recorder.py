@@ -12,7 +12,8 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.arrivals import ClockLine
 from trihedron.capture.detection import silent
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
-from trihedron.capture.reading import ReadingThread, Rows, SourceReturned, Stopped
+from trihedron.capture.log import GrowingLog
+from trihedron.capture.reading import ReadingThread, SourceReturned, Stopped
 from trihedron.capture.sequence import Placed, Sequence
 from trihedron.capture.sources import Source
 from trihedron.capture.timeline import Count, Timeline, clock_sentence
@@ -72,7 +73,7 @@ class Recorder:
         self.ended_because = ""
         self._make = make_decoder
         self._decoder = make_decoder()
-        self._rows = Rows(path, source, rate_hz, overwrite=overwrite)
+        self._rows = GrowingLog(path, source, rate_hz, overwrite=overwrite)
         self._rate_hz = rate_hz
         self._wait_s, self._silence_s = wait_for_return_s, silence_s
         self._sequence: Sequence | None = None
@@ -180,7 +181,7 @@ class Recorder:
             placed, self._held = [*self._held, *placed], []
         if not placed:
             return
-        self._rows.begin_with(self._decoder, timeline)
+        self._rows.begin(self._decoder, timeline)
         times = np.empty(len(placed))
         for i, one in enumerate(placed):
             away = self._lost_while_away(one) if self._new_connection else 0
