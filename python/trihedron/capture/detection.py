@@ -112,32 +112,34 @@ def find_protocol(
     """
     names: Sequence[str | FrameDeclaration] = list(PROTOCOLS) if protocol is None else [protocol]
     makers = [(one if isinstance(one, str) else one.name, decoder_factory(one, name_columns)) for one in names]
-    if not isinstance(source, SerialSource):
-        return _best(source, makers, _listen(source, LISTEN_S, silence_s), silence_s)
+    if baud is not None and isinstance(source, SerialSource) and source.baud != baud:
+        source.set_baud(baud)
+    if baud is not None or not isinstance(source, SerialSource):
+        return _best(source, makers, silence_s)
     heard: list[bytes] = []
     deadline = time.monotonic() + silence_s
-    for candidate in BAUDS if baud is None else (baud,):
+    for candidate in BAUDS:
         if candidate != source.baud and not source.set_baud(candidate):
             continue
         wait = max(deadline - time.monotonic(), LISTEN_S) if not heard else LISTEN_S
         data = _listen(source, LISTEN_S, wait)
         found = _judged(makers, data)
-        if found is None and data and baud is None and len(data) < 200:
+        if found is None and 0 < len(data) < 200:
             # A slow device: read for longer before this baud rate is rejected.
             data += _listen(source, LONGEST_LISTEN_S, 0.0)
             found = _judged(makers, data)
         if found is not None:
             return found
-        if baud is not None and data:
-            return _best(source, makers, data, silence_s)
         heard += [data] if data else []
     if not heard:
         raise silent(source, silence_s)
-    raise _not_understood(source, heard, makers, at_all_bauds=baud is None)
+    raise _not_understood(source, heard, makers, at_all_bauds=True)
 
 
-def _best(source: Source, makers: Makers, data: bytes, silence_s: float) -> Found:
+def _best(source: Source, makers: Makers, silence_s: float) -> Found:
+    """The protocol of a source whose bytes are as they are: a file, a connection, a port of a given baud rate."""
     started = time.monotonic()
+    data = _listen(source, LISTEN_S, silence_s)
     while True:
         found = _judged(makers, data)
         if found is not None:

@@ -116,7 +116,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
-        "written_by": _written_by(),
+        "written_by": written_by(),
         "equation": EQUATION,
         "direction": DIRECTION,
         "frame": calibration.frame,
@@ -204,7 +204,8 @@ def _parameter_order(has_gyroscope: bool) -> list[str]:
     return [f"{sensor}.{parameter}" for sensor in sensors for parameter in PARAMETER_NAMES]
 
 
-def _written_by() -> str:
+def written_by() -> str:
+    """Name and version of the program."""
     try:
         return f"trihedron {version('trihedron')}"
     except PackageNotFoundError:

@@ -7,11 +7,11 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from trihedron.errors import InputError
+from trihedron.files.calibration import written_by
 from trihedron.read import devices_of
 
 ENDINGS = (
@@ -136,15 +136,7 @@ def _digest(path: Path) -> str:
 
 
 def _key(digest: str, device: int | None, options: Mapping[str, Any]) -> str:
-    said = json.dumps({"log": digest, "device": device, "options": dict(options), "version": program()}, sort_keys=True)
+    said = json.dumps(
+        {"log": digest, "device": device, "options": dict(options), "version": written_by()}, sort_keys=True
+    )
     return hashlib.sha256(said.encode()).hexdigest()[:24]
-
-
-def program() -> str:
-    """Name and version, a part of every key, so that results of another version are recomputed."""
-    try:
-        return f"trihedron {version('trihedron')}"
-    except PackageNotFoundError:
-        from trihedron.files.calibration import FORMAT_VERSION
-
-        return f"trihedron (not installed), calibration format {FORMAT_VERSION}"

@@ -89,28 +89,20 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
 
 
 def _log(row: dict[str, Any]) -> FleetLog:
-    diagnosis = row.get("diagnosis") or {}
-    numbers = None if row.get("parameters") is None else np.array(row["parameters"], dtype=np.float64)
-    std = None
-    if row.get("covariance") is not None:
-        std = sigmas_of(np.array(row["covariance"], dtype=np.float64))
+    diagnosis, covariance = row.get("diagnosis") or {}, row.get("covariance")
+    plain = ("n_poses", "static_rms_m_s2", "held_out_rms_m_s2", "seconds")
     return FleetLog(
-        row["name"],
-        row["serial"],
-        row["status"],
-        row.get("reason", ""),
-        diagnosis.get("verdict", ""),
-        tuple(effect["id"] for effect in diagnosis.get("effects", ())),
-        tuple(row.get("serious", ())),
-        bool(row.get("is_trustworthy", False)),
-        row.get("n_poses"),
-        row.get("static_rms_m_s2"),
-        row.get("held_out_rms_m_s2"),
-        row.get("seconds"),
-        numbers,
-        std,
-        row.get("reread", ""),
-        tuple(row.get("warnings", ())),
+        *(row[name] for name in ("name", "serial", "status")),
+        reason=row.get("reason", ""),
+        verdict=diagnosis.get("verdict", ""),
+        effects=tuple(effect["id"] for effect in diagnosis.get("effects", ())),
+        serious=tuple(row.get("serious", ())),
+        is_trustworthy=bool(row.get("is_trustworthy", False)),
+        **{name: row.get(name) for name in plain},
+        numbers=None if covariance is None else np.array(row["parameters"], dtype=np.float64),
+        std=None if covariance is None else sigmas_of(np.array(covariance, dtype=np.float64)),
+        reread=row.get("reread", ""),
+        warned=tuple(row.get("warnings", ())),
     )
 
 

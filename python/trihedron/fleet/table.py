@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from trihedron.arrays import sigmas_of
 from trihedron.files.output import write_whole
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.sessions import PARAMETERS
@@ -46,11 +49,13 @@ def frame_of(rows: Sequence[dict[str, Any]]) -> polars.DataFrame:
     text = {"path", "serial", "status", "reason", "verdict", "effects", "warnings", "serious"}
     text |= {"accelerometer_unit", "gyroscope_unit", "sha256", "version", "key"}
     columns: dict[str, list[Any]] = {name: [_cell(row, name) for row in rows] for name in PLAIN}
+    numbers = [row.get("parameters") or () for row in rows]
+    std = [sigmas_of(np.array(row.get("covariance") or np.zeros((0, 0)))) for row in rows]
     for k, parameter in enumerate(PARAMETERS):
         name = f"{parameter.id}_{parameter.name}".replace("-", "_")
         unit = {"m/s^2": "_m_s2", "rad/s": "_rad_s", "rad": "_rad", "1": "_ln_raw_per_si"}[parameter.unit]
-        columns[name + unit] = [_number(row, k) for row in rows]
-        columns[f"{name}_std"] = [_std(row, k) for row in rows]
+        columns[name + unit] = [one[k] if k < len(one) else None for one in numbers]
+        columns[f"{name}_std"] = [float(one[k]) if k < len(one) else None for one in std]
     kinds: dict[str, Any] = {name: polars.String if name in text else polars.Float64 for name in columns}
     kinds |= {"is_trustworthy": polars.Boolean, "n_samples": polars.Int64, "n_poses": polars.Int64}
     return polars.DataFrame(columns, schema=kinds, strict=False)
@@ -66,13 +71,3 @@ def _cell(row: dict[str, Any], name: str) -> Any:
         return " ".join(row.get(name) or ())
     value = row.get(name)
     return escaped(value) if isinstance(value, str) else value
-
-
-def _number(row: dict[str, Any], k: int) -> float | None:
-    numbers = row.get("parameters") or ()
-    return float(numbers[k]) if k < len(numbers) else None
-
-
-def _std(row: dict[str, Any], k: int) -> float | None:
-    covariance = row.get("covariance") or ()
-    return float(max(covariance[k][k], 0.0)) ** 0.5 if k < len(covariance) else None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.fleet.logs import program
+from trihedron.files.calibration import written_by
 from trihedron.records.checked import WrongTypeError
 
 Row = dict[str, Any]
@@ -26,7 +26,7 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     or lack of memory; tried again by the next run).
     """
     began = time.monotonic()
-    row: Row = {"version": program(), "worker": os.getpid()}
+    row: Row = {"version": written_by(), "worker": os.getpid()}
     try:
         row |= {"status": "done", "reason": "", **_calibrated(path, device, options)}
     except REJECTED as error:
