@@ -9,6 +9,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.channel_facts.static_axes import adc_steps, probe_stride
 from trihedron.records import Recording
+from trihedron.session.rounding import undithered_axes
 
 BLOCK_S = 0.1
 """Shorter than any hand motion (a few hertz), long enough for a variance at 50 Hz and more."""
@@ -17,8 +18,6 @@ BLOCK_SAMPLES = 5
 WINDOW_BLOCKS = 5
 """Stillness is judged over five blocks (half a second): long enough to see a rotation of 1 °/s in gravity, and half of
 the shortest pose."""
-USUALLY_STILL = 0.1
-"""Quantile of a log's windows that represents stillness before poses are found."""
 
 FINEST = 1e-7
 """Least LSB, as a part of a channel's span: no ADC has 23 bits, and in a simulated channel without noise or ADC any
@@ -30,7 +29,8 @@ class Channels:
     """Blocks of ``length`` samples, accelerometer axes first, then gyro axes.
 
     ``mean``, ``variance`` (m, c) in raw units; ``is_valid`` (m,) is false where readings are missing or time jumps;
-    ``quantum`` (c,) is the LSB; ``is_gyroscope`` (c,).
+    ``quantum`` (c,) is the LSB; ``is_gyroscope`` (c,). ``at_limit`` (m, c) is the share of accelerometer readings at a
+    range limit: a static gyro is at none, and those of a stream are not known (its readings are not all seen at once).
     """
 
     length: int
@@ -40,6 +40,7 @@ class Channels:
     is_valid: BoolArray
     quantum: FloatArray
     is_gyroscope: BoolArray
+    at_limit: FloatArray
 
     @property
     def n_blocks(self) -> int:
@@ -97,7 +98,8 @@ class BlockSums:
         steps = [adc_steps(np.concatenate(probe)) for probe in self.probes]
         quantum = _not_below_arithmetic(np.concatenate(steps), mean)
         gyroscope = np.repeat(self.is_gyroscope, 3)
-        return Channels(self.length, self.length / self.rate_hz, mean, variance, is_valid, quantum, gyroscope)
+        step_s, unknown = self.length / self.rate_hz, np.zeros(mean.shape)
+        return Channels(self.length, step_s, mean, variance, is_valid, quantum, gyroscope, unknown)
 
 
 def block_length(rate_hz: float) -> int:
@@ -125,7 +127,17 @@ def split_into_blocks(recording: Recording) -> Channels:
         is_valid &= ~gap[: len(mean) * length].reshape(-1, length).any(axis=1)
     gyroscope = np.repeat([a is recording.gyroscope for a in triads], 3)
     quantum = _not_below_arithmetic(recording.facts.steps, mean)
-    return Channels(length, step_s, mean, variance, is_valid, quantum, gyroscope)
+    return Channels(length, step_s, mean, variance, is_valid, quantum, gyroscope, _at_limits(recording, mean, length))
+
+
+def _at_limits(recording: Recording, mean: FloatArray, length: int) -> FloatArray:
+    """(m, c) share of readings at a range limit of the accelerometer, if its noise dithers the ADC: otherwise a pose
+    keeps the outermost code without any range ending there."""
+    out, facts = np.zeros(mean.shape), recording.facts.accelerometer
+    if facts is not None and facts.limits and not undithered_axes(facts.step, facts.noise.max(keepdims=True)).any():
+        at = facts.at_limits(recording.n_samples)[: len(mean) * length]
+        out[:, :3] = at.reshape(len(mean), length, 3).mean(axis=1)
+    return out
 
 
 def _not_below_arithmetic(step: FloatArray, mean: FloatArray) -> FloatArray:

@@ -3,98 +3,40 @@
 At a range limit a static channel reads one code for seconds, which is no measure of its noise.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.quantiles import median, quantile
+from trihedron.quantiles import median
 from trihedron.ranges import Range
-from trihedron.records import Recording
-from trihedron.records.channel_facts import Limit
-from trihedron.segment.channels import USUALLY_STILL, WINDOW_BLOCKS, Channels, rolling_mean
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 
-NEAR = 4.0
-"""Standard deviations of the noise from a limit within which readings are clipped, and look quieter than they are."""
 SELDOM = 0.1
 """Share of a log inside the range below which a channel's quiet windows cannot be separated from the others."""
-TELLS_CODES_APART = 0.6
-"""Noise over LSB from which a reading never keeps one code by chance: half a second of it has at least two codes with a
-probability of all but one in a billion."""
 CUT = 0.01
 """Share of a pose's readings at the range limit above which its mean is clipped: below it the mean errs by less than
 0.4 % of a reading's noise, a tenth of the error of a mean of 700 readings."""
 
 
-@dataclass(frozen=True)
-class RangeEnd:
-    """The outermost reading of channel ``channel`` on the side ``side`` (1 or -1).
-
-    ``margin`` is where readings are clipped (raw units); ``is_certain`` where noise never keeps one code.
-    """
-
-    channel: int
-    side: int
-    reading: float
-    margin: float
-    is_certain: bool
-
-
-def range_ends(channels: Channels, limits: Sequence[tuple[int, Limit]]) -> tuple[RangeEnd, ...]:
-    """The range limits, of all (channel, limit), that poses may be at.
-
-    A stream has no limits: its readings are not all seen at once (:mod:`trihedron.channel_facts.limits`).
-    """
-    out: list[RangeEnd] = []
-    for c, limit in limits:
-        noise = 0.0 if channels.is_gyroscope[c] else _usual_noise(channels, c)
-        # A static gyro is at no range limit, and a channel without noise has no tail to be clipped.
-        if noise > 0.0:
-            step, rounding = float(channels.quantum[c]), float(channels.quantisation_variance[c])
-            margin = max(NEAR * float(np.sqrt(noise)), step)
-            is_certain = noise - rounding > (TELLS_CODES_APART * step) ** 2
-            out.append(RangeEnd(c, 1 if limit.is_high else -1, limit.value, margin, is_certain))
-    return tuple(out)
-
-
-def _usual_noise(channels: Channels, channel: int) -> float:
-    """Variance of a reading in calm windows of a channel that exceeds rounding; 0 where none does."""
-    variance = np.where(channels.is_valid, channels.variance[:, channel], 0.0)[:, None]
-    power = rolling_mean(variance, min(WINDOW_BLOCKS, channels.n_blocks))[:, 0]
-    live = power[channels.is_valid & (power > 2.0 * channels.quantisation_variance[channel])]
-    return quantile(live, USUALLY_STILL) if len(live) else 0.0
-
-
-def inside_the_range(channels: Channels, ends: Sequence[RangeEnd]) -> BoolArray:
-    """(m, c) windows in which a channel's scatter is the sensor's own.
+def inside_the_range(channels: Channels) -> BoolArray:
+    """(m, c) windows in which a channel's scatter is the sensor's own: none of its readings is at a range limit.
 
     A pose beyond the range gives one code for seconds, the quietest part of the log by far; with that as its noise
     floor, every pose inside the range would seem to vibrate.
     """
-    inside = np.ones(channels.mean.shape, dtype=np.bool_)
-    for end in ends:
-        reading = np.where(channels.is_valid, end.side * channels.mean[:, end.channel], -np.inf)
-        near = (reading >= end.side * end.reading - end.margin)[:, None].astype(np.float64)
-        inside[:, end.channel] &= rolling_mean(near, min(WINDOW_BLOCKS, channels.n_blocks))[:, 0] == 0.0
+    near = (channels.at_limit > 0.0).astype(np.float64)
+    inside: BoolArray = rolling_mean(near, min(WINDOW_BLOCKS, channels.n_blocks)) == 0.0
     # A channel that is hardly ever inside has no other windows.
     inside[:, inside.mean(axis=0) < SELDOM] = True
     return inside
 
 
-def is_cut(recording: Recording, channels: Channels, blocks: Range, ends: Sequence[RangeEnd]) -> RangeEnd | None:
-    """The accelerometer's range limit that a static interval is at, or ``None``: it only gives a bound of gravity."""
-    if recording.accelerometer is None:
-        return None
-    rows = recording.accelerometer[blocks[0] * channels.length : blocks[1] * channels.length]
-    for end in ends:
-        if not end.is_certain or channels.is_gyroscope[end.channel]:
-            continue
-        at_end = end.side * (rows[:, end.channel] - end.reading) >= -0.5 * channels.quantum[end.channel]
-        if float(np.mean(at_end)) > CUT:
-            return end
-    return None
+def clipped_channel(channels: Channels, blocks: Range) -> int | None:
+    """The channel of a static interval that is at its range limit, or ``None``: it only gives a bound of gravity."""
+    share = channels.at_limit[slice(*blocks)].mean(axis=0)
+    return int(np.argmax(share)) if share.max() > CUT else None
 
 
 SEED_S = 1.0
@@ -137,18 +79,18 @@ class Activity:
         return median(ratio) > 0.5 * WINDOW_BLOCKS * channels.length
 
 
-def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activity:
+def measure_activity(channels: Channels) -> Activity:
     """Noise floor, by growing the quietest windows until they include every window that the same noise explains.
 
     The floor of a channel is the median over the quiet windows, which is robust against axes of different noise and a
     few disturbed windows; the limit is the false-alarm quantile of a log-normal with the width of the chi-square
     distribution, or of the quiet windows' lower half where that is larger (coloured noise, rounding).
-    Windows of a channel at one of the range limits ``ends`` are excluded.
+    Windows of a channel at its range limit are excluded.
     """
     width = min(WINDOW_BLOCKS, channels.n_blocks)
     freedom = max(width - 1, 1)
     fast, slow, limits, is_quiet, white, drift = _core.noise_floor(
-        channels.mean, channels.variance, channels.is_valid, inside_the_range(channels, ends),
+        channels.mean, channels.variance, channels.is_valid, inside_the_range(channels),
         channels.quantisation_variance, channels.length,
         (width, channels.blocks(SEED_S), probability.chdtri(freedom, 0.5) / freedom), TAILS,
     )  # fmt: skip

@@ -1,7 +1,5 @@
 """Findings on the poses and on the log as a whole."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from trihedron import probability
@@ -11,7 +9,7 @@ from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
-from trihedron.segment.floor import RangeEnd, is_cut
+from trihedron.segment.floor import clipped_channel
 from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.runs import Run, means_of
@@ -101,23 +99,23 @@ def _first_blocks(ranges: list[Range], count: int) -> list[Range]:
     return out
 
 
-def without_cut(
-    recording: Recording, channels: Channels, runs: list[Run], ends: Sequence[RangeEnd]
-) -> tuple[list[Run], list[Finding]]:
+def without_cut(recording: Recording, channels: Channels, runs: list[Run]) -> tuple[list[Run], list[Finding]]:
     """Runs whose accelerometer was inside its range, and a finding on the others."""
-    cut = [is_cut(recording, channels, (run.first, run.last), ends) for run in runs]
-    kept = [run for run, end in zip(runs, cut, strict=True) if end is None]
-    clipped = [run for run, end in zip(runs, cut, strict=True) if end is not None]
-    first = next(((run, end) for run, end in zip(runs, cut, strict=True) if end is not None), None)
-    if first is None:
+    cut = [clipped_channel(channels, (run.first, run.last)) for run in runs]
+    kept = [run for run, axis in zip(runs, cut, strict=True) if axis is None]
+    clipped = [(run, axis) for run, axis in zip(runs, cut, strict=True) if axis is not None]
+    if not clipped:
         return runs, []
+    run, axis = clipped[0]
+    mean = means_of(channels.mean, [run.quiet_ranges()])[0, axis]
+    values = [limit.value for limit in recording.facts.of("accelerometer").limits if limit.axis == axis]
     said = Finding.of(
         FindingCode.POSE_AT_RANGE_LIMIT,
         poses=len(clipped),
-        first_s=float(recording.time_s[first[0].first * channels.length]),
-        axis=int(np.sum(~channels.is_gyroscope[: first[1].channel + 1])),
-        reading=first[1].reading,
-        is_stuck=_exceeds_gravity(channels, clipped, kept),
+        first_s=float(recording.time_s[run.first * channels.length]),
+        axis=axis + 1,
+        reading=min(values, key=lambda value: abs(value - mean)),
+        is_stuck=_exceeds_gravity(channels, [run for run, _ in clipped], kept),
     )
     return kept, [said]
 

@@ -1,6 +1,5 @@
 """Segmentation of one recording into poses and moves."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -12,11 +11,10 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.quantiles import quantile, quantiles
 from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, Move, Pose, Recording, Segments
-from trihedron.records.channel_facts import Limit
 from trihedron.records.progress import Progress
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
-from trihedron.segment.floor import Activity, measure_activity, range_ends
+from trihedron.segment.floor import Activity, measure_activity
 from trihedron.segment.judge import judge_log, judge_runs, judge_settling, judge_vibration, without_cut
 from trihedron.segment.means import PoseMeans, average_poses
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
@@ -52,29 +50,15 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
     report = progress or (lambda _done, _text: None)
     report(0.0, "noise of short blocks")
     channels = split_into_blocks(recording)
-    return segment_blocks(recording, channels, limits=_limits(recording), progress=progress)
+    return segment_blocks(recording, channels, progress=progress)
 
 
-def _limits(recording: Recording) -> list[tuple[int, Limit]]:
-    """Limits of all channels, with channels numbered as in blocks."""
-    sensors = [one for one in (recording.facts.accelerometer, recording.facts.gyroscope) if one is not None]
-    return [(3 * k + limit.axis, limit) for k, facts in enumerate(sensors) for limit in facts.limits]
-
-
-def segment_blocks(
-    recording: Recording,
-    channels: Channels,
-    *,
-    limits: Sequence[tuple[int, Limit]] = (),
-    progress: Progress | None = None,
-) -> Segments:
-    """As :func:`segment_recording`, from blocks and the (channel, limit) of range limits; of the recording itself only
-    rows of poses are read."""
+def segment_blocks(recording: Recording, channels: Channels, *, progress: Progress | None = None) -> Segments:
+    """As :func:`segment_recording`, from blocks; of the recording itself only rows of poses are read."""
     report = progress or (lambda _done, _text: None)
     if channels.is_valid.sum() < WINDOW_BLOCKS:
         return _nothing_found(recording, channels)
-    ends = range_ends(channels, limits)
-    activity = measure_activity(channels, ends)
+    activity = measure_activity(channels)
     if activity.is_drifting(channels):
         return _nothing_found(recording, channels)
     report(0.4, "static stretches")
@@ -95,7 +79,7 @@ def segment_blocks(
     found = _find_runs(recording, channels, quiet, loose)
     found = find_vibrating(recording, channels, activity, found, ~turning, (gravity, scale))
     found.sort(key=lambda run: run.first)
-    runs, said = without_cut(recording, channels, found, ends)
+    runs, said = without_cut(recording, channels, found)
     report(0.7, "means and their errors")
     segments = _describe(recording, channels, activity, runs, turning)
     return replace(segments, findings=(*said, *segments.findings)) if said else segments
