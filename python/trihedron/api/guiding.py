@@ -283,7 +283,7 @@ def _pose_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
 
 
 def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
-    quiet = {"few-poses", "unit-detected", "no-initial-pose"}
+    quiet = {"few-poses", "unit-detected"}
     found = [*recording.findings, *segments.findings]
     return tuple(f.seen for f in found if f.severity is not Severity.NOTE and f.code.value not in quiet)[:4]
 

@@ -71,14 +71,12 @@ class FindingCode(str, Enum):
     LOSSES_POSSIBLE = "losses-possible"
     GRAVITY_MISSING = "gravity-missing"
     # segment
-    NO_INITIAL_POSE = "no-initial-pose"
     POSE_SETTLING = "pose-settling"
     BIAS_SETTLING = "bias-settling"
     POSE_DISTURBED = "pose-disturbed"
     POSE_UNSTEADY = "pose-unsteady"
     POSES_VIBRATE = "poses-vibrate"
     POSE_AT_RANGE_LIMIT = "pose-at-range-limit"
-    SLOW_TURN = "slow-turn"
     FEW_POSES = "few-poses"
     NOT_STATIC = "not-static"
     # calibrate

@@ -3,9 +3,9 @@
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.probability import FALSE_ALARM
-from trihedron.ranges import Range, ranges_of
+from trihedron.ranges import Range
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
@@ -130,15 +130,12 @@ def _exceeds_gravity(channels: Channels, cut: list[Run], kept: list[Run]) -> boo
     return bool(kept) and float(np.median(norms[0])) > (1.0 + BEYOND_GRAVITY) * float(np.median(norms[1]))
 
 
-def judge_log(
-    recording: Recording, channels: Channels, runs: list[Run], poses: tuple[Pose, ...], turning: BoolArray
-) -> list[Finding]:
-    """Findings on the log as a whole: number of poses, slow rotation, no initial pose."""
-    found: list[Finding] = []
+def judge_log(recording: Recording, channels: Channels, n: int) -> list[Finding]:
+    """Finding on the number ``n`` of poses, if these are too few."""
     duration = recording.duration_s
     # Five whole blocks make a window, and a block begins anywhere in the log.
     least_s = max(LEAST_POSE_S, (WINDOW_BLOCKS + 1) * channels.step_s)
-    if not runs:
+    if n == 0:
         is_assumed = any(one.code is FindingCode.RATE_ASSUMED for one in recording.findings)
         is_short = duration < POSES_FOR_NINE * LEAST_POSE_S
         said = Finding.of(
@@ -146,20 +143,9 @@ def judge_log(
             is_assumed=is_assumed, is_short=is_short, is_slow=least_s > LEAST_POSE_S,
         )  # fmt: skip
         return [said]
-    # Shorter ranges are the ends of moves.
-    turns = [(a, b) for a, b in ranges_of(turning) if b - a >= channels.blocks(LEAST_POSE_S)]
-    if turns:
-        total = sum(b - a for a, b in turns) * channels.step_s
-        found.append(
-            Finding.of(FindingCode.SLOW_TURN, turning_s=total, first_s=recording.time_s[turns[0][0] * channels.length])
-        )
-    if poses[0].start / recording.rate_hz > 1.0 and recording.n_samples:
-        found.append(Finding.of(FindingCode.NO_INITIAL_POSE, first_pose_s=_start_s(recording, poses[0])))
-    if (n := len(poses)) < POSES_FOR_NINE:
-        found.append(
-            Finding.of(FindingCode.FEW_POSES, poses=n, duration_s=duration, needed=POSES_FOR_NINE, least_s=least_s)
-        )
-    return found
+    if n >= POSES_FOR_NINE:
+        return []
+    return [Finding.of(FindingCode.FEW_POSES, poses=n, duration_s=duration, needed=POSES_FOR_NINE, least_s=least_s)]
 
 
 def judge_vibration(

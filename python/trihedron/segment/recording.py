@@ -81,7 +81,7 @@ def segment_blocks(recording: Recording, channels: Channels, *, progress: Progre
     found.sort(key=lambda run: run.first)
     runs, said = without_cut(recording, channels, found)
     report(0.7, "means and their errors")
-    segments = _describe(recording, channels, activity, runs, turning)
+    segments = _describe(recording, channels, activity, runs)
     return replace(segments, findings=(*said, *segments.findings)) if said else segments
 
 
@@ -115,25 +115,18 @@ def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
     return float((high - low).max() / 2.0) or None
 
 
-def _describe(
-    recording: Recording, channels: Channels, activity: Activity, runs: list[Run], turning: BoolArray
-) -> Segments:
+def _describe(recording: Recording, channels: Channels, activity: Activity, runs: list[Run]) -> Segments:
     has_unit = acceleration_to_si(recording.accelerometer_unit) is not None
     settling = find_settling(channels, runs, has_unit=has_unit)
-    as_read = _averaged(recording, channels, activity, runs, turning, None)
+    as_read = _averaged(recording, channels, activity, runs, None)
     if settling is None:
         return as_read
-    settled = _averaged(recording, settling.channels, activity, runs, turning, settling)
+    settled = _averaged(recording, settling.channels, activity, runs, settling)
     return replace(settled, as_read=replace(as_read, findings=settled.findings))
 
 
 def _averaged(
-    recording: Recording,
-    channels: Channels,
-    activity: Activity,
-    runs: list[Run],
-    turning: BoolArray,
-    settling: Settling | None,
+    recording: Recording, channels: Channels, activity: Activity, runs: list[Run], settling: Settling | None
 ) -> Segments:
     """Segments of the ``channels``, which are without the settling if there is any."""
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
@@ -144,7 +137,7 @@ def _averaged(
     means = average_poses(recording, channels, runs, poses, noise)
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
-    found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, runs, poses, turning)
+    found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, len(runs))
     if settling is not None:
         means = settling.without(means)
         found.append(judge_settling(settling, means))
@@ -181,7 +174,7 @@ def _nothing_found(recording: Recording, channels: Channels) -> Segments:
     n_channels = channels.mean.shape[1]
     empty = np.zeros((0, n_channels))
     means = PoseMeans(empty, empty, np.zeros(0, dtype=np.int64))
-    findings = tuple(judge_log(recording, channels, [], (), np.zeros(0, dtype=bool)))
+    findings = tuple(judge_log(recording, channels, 0))
     return _assemble(recording, (), (), np.full(n_channels, np.nan), means, findings)
 
 

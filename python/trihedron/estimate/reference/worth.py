@@ -124,8 +124,8 @@ def earth_of(found: MotionFit, k: int) -> Estimate | None:
 # Findings on a reference that affect the result.
 
 
-TILT_DEG = 10.0
-"""Largest angle of the world's z axis from the vertical without a finding."""
+UPRIGHT = np.cos(np.radians(45.0))
+"""Component of the vertical along an axis to which it is nearer than to the horizontal."""
 COLOURED = 3.0
 """Factor on the accelerometer's uncertainties above which its residuals are not explained by the noise model."""
 LEFT_OUT = 0.05
@@ -136,8 +136,8 @@ def remarks(result: AgainstReference, is_turned: bool, slip: Slip | None) -> Ite
     error = result.error
     if is_turned:
         yield Finding.of(FindingCode.REFERENCE_TURNED_ROUND)
-    if result.vertical is not None:
-        yield from _up(result)
+    if result.vertical is not None and (up := result.vertical.value)[2] < -UPRIGHT:
+        yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, up_x=up[0], up_y=up[1], up_z=up[2])
     if error.signs:
         seen = {sign.kind: sign.seen for sign in error.signs}
         yield Finding.of(
@@ -167,13 +167,3 @@ def of_error(error: ReferenceError, slip: Slip | None, *, is_of_noise: bool = Fa
         )
     elif apart := error.apart_s:
         yield Finding.of(FindingCode.REFERENCE_APART, start_s=apart[0][0], end_s=apart[-1][1], n=len(apart))
-
-
-def _up(result: AgainstReference) -> Iterator[Finding]:
-    assert result.vertical is not None
-    up = result.vertical.value
-    lean = float(np.degrees(np.arccos(np.clip(abs(up[2]), 0.0, 1.0))))
-    if up[2] < -np.cos(np.radians(45.0)):
-        yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, "down", up_x=up[0], up_y=up[1], up_z=up[2])
-    elif lean > TILT_DEG:
-        yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, "leans", lean_deg=lean, up_x=up[0], up_y=up[1], up_z=up[2])

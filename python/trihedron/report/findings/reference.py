@@ -46,17 +46,11 @@ ENTRIES = {
         "Jumps of a tracker that lost its markers, or impacts.",
         "Look at the reference's own quality flags.",
     ),
-    (Code.REFERENCE_UPSIDE_DOWN, "down", WARNING): Words(
+    (Code.REFERENCE_UPSIDE_DOWN, "", WARNING): Words(
         "In static poses the specific force points along -Z of the reference's world.",
         "Its z points down (north, east, down), or the reference is mirrored, or the log's accelerometer shows gravity "
         "instead of specific force.",
         "If z is up there, turn the sign of one axis of the reference, or of the accelerometer.",
-        numbers=("up_x", "up_y", "up_z"),
-    ),
-    (Code.REFERENCE_UPSIDE_DOWN, "leans", WARNING): Words(
-        "The plumb line leans {lean_deg:.0f}° from the z of the reference's world.",
-        "A world frame that is not level.",
-        "Nothing, if this is intended: the plumb line was estimated.",
         numbers=("up_x", "up_y", "up_z"),
     ),
     (Code.REFERENCE_OF_ITSELF, "", WARNING): Words(

@@ -57,17 +57,6 @@ ENTRIES = {
         "The sensor was held in the hand or stood on a support that shakes.",
         "Put the sensor down in every pose and record again: the motion makes S and b less certain.",
     ),
-    (Code.SLOW_TURN, "", NOTE): Words(
-        "{turning_s:.1f} s are static to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} "
-        "s; taken as moving.",
-        "A slow steady turn about the vertical; or a gyro bias that drifts, as it does with temperature.",
-        "Nothing needs to be done.",
-    ),
-    (Code.NO_INITIAL_POSE, "", NOTE): Words(
-        "The log begins in motion: the first pose starts at {first_pose_s:.1f} s.",
-        "Logging was started with the case in hand, or the readings drifted at first.",
-        "Nothing needs to be done: the noise was measured in the poses themselves.",
-    ),
     (Code.FEW_POSES, "", WARNING): Words(
         "{poses:# pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
         "in different directions.",
