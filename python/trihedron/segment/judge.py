@@ -5,10 +5,9 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray
 from trihedron.probability import FALSE_ALARM
-from trihedron.ranges import Range
 from trihedron.records import Finding, FindingCode, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
-from trihedron.segment.channels import WINDOW_BLOCKS, Channels
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels, mean_present
 from trihedron.segment.floor import clipped_channel
 from trihedron.segment.means import PoseMeans, rounding_bias_variance
 from trihedron.segment.noise import MeanNoise
@@ -62,41 +61,20 @@ def judge_runs(
 def _settling_sizes(channels: Channels, runs: list[Run], noise: MeanNoise, chance: float) -> FloatArray:
     """(h,) difference between the halves of steady runs in standard errors, where it exceeds chance, otherwise 0."""
     sizes = np.zeros(len(runs))
-    judged = [k for k, run in enumerate(runs) if not run.is_unsteady and len(_halves(run)[0]) > 0]
-    if not judged:
-        return sizes
-    halves = [_halves(runs[k]) for k in judged]
-    n = np.array([sum(b - a for a, b in first) for first, _ in halves])
-    means = means_of(channels.mean, [half for both in halves for half in both])
-    difference = means[1::2] - means[::2]
     # Without dither the mean of a half may be wrong by half an LSB as long as it lasts.
     rounding = channels.quantisation_variance / channels.length + 2.0 * rounding_bias_variance(channels, runs)
-    variance = 2.0 * noise.variance(n[:, None] * channels.step_s) + rounding
-    live = variance > 0.0
-    statistic = np.sum(np.where(live, difference**2, 0.0) / np.where(live, variance, 1.0), axis=1)
-    limit = {freedom: probability.chdtri(freedom, chance) for freedom in set(live.sum(axis=1).tolist()) if freedom}
-    is_beyond = statistic > np.array([limit.get(freedom, np.inf) for freedom in live.sum(axis=1).tolist()])
-    sizes[judged] = np.where(is_beyond, np.sqrt(statistic), 0.0)
+    for k, run in enumerate(runs):
+        blocks = run.quiet_rows(channels.mean)
+        half = len(blocks) // 2
+        if run.is_unsteady or half < 2:
+            continue
+        difference = mean_present(blocks[-half:]) - mean_present(blocks[:half])
+        variance = 2.0 * noise.variance(half * channels.step_s) + rounding
+        live = variance > 0.0
+        statistic = float(np.sum(difference[live] ** 2 / variance[live]))
+        if live.any() and statistic > probability.chdtri(int(live.sum()), chance):
+            sizes[k] = np.sqrt(statistic)
     return sizes
-
-
-def _halves(run: Run) -> tuple[list[Range], list[Range]]:
-    """Ranges of the first and of the last half of a run's quiet blocks; none if a half has fewer than two."""
-    ranges = run.quiet_ranges()
-    half = sum(b - a for a, b in ranges) // 2
-    if half < 2:
-        return [], []
-    mirrored = [(-b, -a) for a, b in reversed(ranges)]
-    return _first_blocks(ranges, half), [(-b, -a) for a, b in reversed(_first_blocks(mirrored, half))]
-
-
-def _first_blocks(ranges: list[Range], count: int) -> list[Range]:
-    out, left = [], count
-    for a, b in ranges:
-        if left:
-            out.append((a, min(b, a + left)))
-            left -= out[-1][1] - a
-    return out
 
 
 def without_cut(recording: Recording, channels: Channels, runs: list[Run]) -> tuple[list[Run], list[Finding]]:

@@ -1,8 +1,8 @@
 """Standard deviations between sessions with intervals that are valid for few sessions (docs/many-recordings.md).
 
 The model of one parameter: ``y_ij = μ + d_i + u_ij + e_ij``, ``d`` of the group (day, device) with variance σ_d²,
-``u`` of the session with σ_u², ``e`` the session's own error with known variance. The point is the restricted maximum
-of likelihood. The interval inverts the weighted sum of squares
+``u`` of the session with σ_u², ``e`` the session's own error with known variance. Point and interval
+invert the weighted sum of squares
 
     Q(σ²) = Σ w_ij (y_ij - ȳ_i)²,   w = 1/(σ² + v_ij),   Q(σ_u²) ~ χ²_ν                                        (1)
 
@@ -82,7 +82,7 @@ def spread_within(values: FloatArray, variances: FloatArray, groups: Sequence[ob
     dof = sum(len(group) - 1 for group in members)
     if dof < 1:
         return None
-    return _spread(values, variances, members, dof)
+    return _spread(*_padded(values, variances, members), dof)
 
 
 def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[object]) -> Spread | None:
@@ -95,7 +95,7 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
     dof_within = sum(len(group) - 1 for group in members)
     if len(members) < 2 or dof_within < 1:
         return None
-    within = _spread(values, variances, members, dof_within)
+    within = _spread(*_padded(values, variances, members), dof_within)
     dof = len(members) - 1
     one_group = [np.arange(len(members))]
     points = (np.arange(QUANTILES) + 0.5) / QUANTILES
@@ -105,11 +105,11 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
     level, own = (np.array(one)[:, None, :] for one in zip(*at_each, strict=True))
     draws = _solved(level, own, np.ones((1, len(members)), dtype=bool), targets)
     ends = np.sqrt(np.quantile(draws, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
-    means, variance = _group_means(values, variances, members, within.sd**2)
-    point = _restricted(means, variance, one_group)
+    means = _padded(*_group_means(values, variances, members, within.sd**2), one_group)
+    point = float(np.sqrt(_solved(*means, np.array([float(dof)]))[0]))
     if ends[1] == 0.0:
-        ends[1] = _spread(means, variance, one_group, dof).high
-    return Spread(float(np.clip(point, ends[0], ends[1])), float(ends[0]), float(ends[1]), dof)
+        ends[1] = _spread(*means, dof).high
+    return Spread(float(np.clip(point, *ends)), float(ends[0]), float(ends[1]), dof)
 
 
 def spread_of_next(spread: Spread | None) -> float:
@@ -168,17 +168,16 @@ def _members(groups: Sequence[object]) -> list[IntArray]:
     return [np.array([k for k, group in enumerate(groups) if group == name], dtype=np.int64) for name in names]
 
 
-def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], dof: int) -> Spread:
+def _spread(y: FloatArray, v: FloatArray, is_there: BoolArray, dof: int) -> Spread:
+    """Spread of values and variances by group: σ at which Q is its mean (Paule and Mandel 1982), and its interval."""
     tail = 0.5 - LEVEL / 2.0
-    targets = _chi_square([tail, 1.0 - tail], dof)
-    y, v, is_there = _padded(values, variances, members)
-    low, high = np.sqrt(_solved(y, v, is_there, targets))
+    targets = np.append(_chi_square([tail, 1.0 - tail], dof), dof)
+    low, high, point = np.sqrt(_solved(y, v, is_there, targets))
     if high == 0.0:
         # Sessions agree better than their uncertainties allow: these are reduced for the upper limit, which is not 0.
         q = float(_q(y, v, is_there, np.zeros(1))[0])
-        high = float(np.sqrt(_solved(y, v * max(q / dof, 1e-6), is_there, targets[1:])[0]))
-    point = _restricted(values, variances, members)
-    return Spread(float(np.clip(point, low, high)), float(low), float(high), dof)
+        high = float(np.sqrt(_solved(y, v * max(q / dof, 1e-6), is_there, targets[1:2])[0]))
+    return Spread(float(point), float(low), float(high), dof)
 
 
 def _q(y: FloatArray, v: FloatArray, is_there: BoolArray, s2: FloatArray) -> FloatArray:
@@ -213,25 +212,6 @@ def _solved(y: FloatArray, v: FloatArray, is_there: BoolArray, targets: FloatArr
         above = _q(y, v, is_there, np.exp(middle)) > targets
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
-
-
-def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArray]) -> float:
-    """σ at the maximum of the restricted likelihood, with free group means."""
-    largest = max(float(np.sqrt(max(np.ptp(values[group]) for group in members) ** 2 + variances.max())), TINY)
-
-    y, v, is_there = _padded(values, variances, members)
-
-    def negative(sigma: float) -> float:
-        weights = np.where(is_there, 1.0 / (v + sigma**2), 0.0)
-        total = weights.sum(axis=1)
-        mean = (weights * y).sum(axis=1) / total
-        logarithms = np.log(weights, out=np.zeros_like(weights), where=is_there)
-        return float((weights * (y - mean[:, None]) ** 2).sum() - logarithms.sum() + np.log(total).sum())
-
-    from scipy.optimize import minimize_scalar
-
-    best = minimize_scalar(negative, bounds=(0.0, 3.0 * largest), method="bounded", options={"xatol": 1e-5 * largest})
-    return 0.0 if negative(0.0) <= best.fun else float(best.x)
 
 
 def _group_means(
