@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from trihedron.estimate.gyroscope.findings import TurnName
 from trihedron.estimate.gyroscope.stated_turns import TableTurns, measure_turns
 from trihedron.records import Calibration, Move, SensorCalibration
 
@@ -16,8 +15,10 @@ def turned(recording, spans, static, angles, axes, scale, square=1e-2):
     """
     moves = [Move(k, k, k + 1, a, b) for k, (a, b) in enumerate(spans)]
     measured = measure_turns(recording, moves, static)
-    names = [TurnName(k + 1, 0.0) for k in range(len(moves))]
-    turns = TableTurns(names, moves, measured, np.array(angles), np.eye(3)[axes], is_stated=True)
+    turns = TableTurns(
+        **vars(measured), moves=moves, numbers=1 + np.arange(len(moves)), begin_s=np.zeros(len(moves)),
+        angles=np.array(angles), up=np.eye(3)[axes], is_stated=True,
+    )  # fmt: skip
     rest_s = sum(recording.time_s[b - 1] - recording.time_s[a] for a, b in static)
     of_bias = measured.var_rate / rest_s + measured.bias_spread / len(static) + np.sum(measured.hidden**2, axis=(0, 2))
     covariance = np.zeros((24, 24))

@@ -263,8 +263,7 @@ def _by_faces(
     try:
         stated = None
         if turns_deg is not None:
-            turns = table_turns(recording, segments, accelerometer, turns_deg)
-            stated = scale_of_stated(turns.measured.turned(), turns.angles[:, None] * turns.up)
+            stated = scale_of_stated(table_turns(recording, segments, accelerometer, turns_deg))
         # Residuals of faces are leans of the table, which poses and moves do not have.
         near = replace(alone, accelerometer=replace(accelerometer, quality=None), findings=found)
         session = replace(calibrate_joint(recording, segments, near, nominal, stated), frame="lower")

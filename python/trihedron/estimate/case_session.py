@@ -81,11 +81,9 @@ def _placed(up: IntArray, turns: TableTurns) -> tuple[FloatArray, IntArray]:
 
 
 def _on_faces(turns: TableTurns, up: IntArray) -> OnFaces:
-    measured, times = turns.measured, turns.measured.duration_s
-    variance = measured.var_rate * times[:, None] + measured.bias_spread * times[:, None] ** 2
-    variance = variance + np.sum(measured.hidden**2, axis=2)
+    variance = turns.variance + np.sum(turns.hidden**2, axis=2)
     faces = up[[move.pose_before for move in turns.moves]]
-    return OnFaces(measured.raw_angle, variance[:, :, None] * np.eye(3), faces, turns.angles, times)
+    return OnFaces(turns.raw_angle, variance[:, :, None] * np.eye(3), faces, turns.angles, turns.duration_s)
 
 
 def _nearest(faces: IntArray, up: FloatArray) -> FloatArray:

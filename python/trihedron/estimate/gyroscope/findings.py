@@ -1,7 +1,6 @@
 """Findings of the fit of moves."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -183,51 +182,6 @@ def drift_findings(case: str, bias: FloatArray, excess: FloatArray, S: FloatArra
         change_rad_s=change[axis],
         axis=axis + 1,
         times=np.sqrt(excess[axis] / dof),
-    )
-
-
-LOOSE_TURN_RAD = np.radians(1.0)
-"""Scatter of turns above which it is reported: a square case against a wall repeats to some tenths of a degree."""
-
-
-def loose_turns(sigma_turn_rad: float) -> Iterator[Finding]:
-    """Finding on turns that scatter about their known angles."""
-    if sigma_turn_rad > LOOSE_TURN_RAD:
-        yield Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=sigma_turn_rad)
-
-
-class TurnName(NamedTuple):
-    """A turn's ``number`` among all that were found, from one, and when it begins."""
-
-    number: int
-    at_s: float
-
-
-def wrong_turn(
-    at: TurnName, angle_rad: float, axis: int, deviation_rad: float, *, is_excluded: bool, is_stated: bool
-) -> Finding:
-    """Finding on a turn that others contradict; where they do not show which of them is wrong, none is excluded."""
-    return Finding.of(
-        FindingCode.TURN_NOT_A_MULTIPLE,
-        "left-out" if is_excluded else "contradicted",
-        turn=at.number,
-        at_s=at.at_s,
-        is_stated=is_stated,
-        angle_rad=angle_rad,
-        axis=axis + 1,
-        deviation_rad=abs(deviation_rad),
-    )
-
-
-def no_multiple(at: TurnName, seen_rad: float, axis: int) -> Finding:
-    """Finding on a turn that is none of the multiples of 90° it is read as."""
-    return Finding.of(
-        FindingCode.TURN_NOT_A_MULTIPLE,
-        "no-multiple",
-        turn=at.number,
-        at_s=at.at_s,
-        axis=axis + 1,
-        seen_rad=seen_rad,
     )
 
 

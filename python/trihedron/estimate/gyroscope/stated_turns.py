@@ -12,7 +12,6 @@ from trihedron._core import block_differences, integrate_raw_rate
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
-from trihedron.estimate.gyroscope.findings import TurnName, loose_turns, no_multiple, wrong_turn
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
 from trihedron.estimate.gyroscope.turntable import StatedRates, Updated, not_fitted
@@ -29,43 +28,78 @@ SIGMAS = 3.0
 """Standard errors of an angle within that, so that it is told which multiple it is."""
 LEAST_RAD = 0.2
 """Smaller rotations about the vertical are no turns: the case was lifted and set down again."""
+LOOSE_RAD = np.radians(1.0)
+"""Scatter of turns above which it is reported: a square case against a wall repeats to some tenths of a degree."""
+MIN_SPREAD = 0.2
+"""Smallest singular value of unit turn axes that determine all of S: three axes within some 10° of one plane have
+less."""
 
 
-@dataclass(frozen=True, eq=False)
-class TableTurns:
-    """``moves`` that leave gravity where it is, with their ``names``, as ``measured``: turns by ``angles`` (k,) [rad]
-    about the vertical ``up`` (k, 3), counter-clockwise seen from above, which are stated or taken as such."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MeasuredTurns:
+    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the ``bias`` (3,) at rest, and their noise.
 
-    names: list[TurnName]
+    ``var_rate`` (3,) is ``N²`` in raw unit² · s, ``bias_spread`` (3,) the variance of the true bias between intervals
+    without rotation. ``hidden`` (k, 3, m) are errors by rounding.
+    """
+
+    raw_angle: FloatArray
+    duration_s: FloatArray
+    bias: FloatArray
+    var_rate: FloatArray
+    bias_spread: FloatArray
+    hidden: FloatArray
+
+    @property
+    def variance(self) -> FloatArray:
+        """(k, 3) variance of the raw angles but for rounding."""
+        times = self.duration_s[:, None]
+        return self.var_rate * times + self.bias_spread * times**2
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TableTurns(MeasuredTurns):
+    """``moves`` that leave gravity where it is, with their ``numbers`` (k,) among all, from one, which begin at
+    ``begin_s`` (k,): turns by ``angles`` (k,) [rad] about the vertical ``up`` (k, 3), counter-clockwise seen from
+    above, which are stated or taken as such."""
+
     moves: list[Move]
-    measured: MeasuredTurns
+    numbers: IntArray
+    begin_s: FloatArray
     angles: FloatArray
     up: FloatArray
     is_stated: bool
 
     def of(self, used: BoolArray) -> TableTurns:
         """The turns ``used`` (k,)."""
-        kept = np.flatnonzero(used)
-        names, moves = [self.names[k] for k in kept], [self.moves[k] for k in kept]
-        return TableTurns(names, moves, self.measured.of(used), self.angles[used], self.up[used], self.is_stated)
+        return replace(
+            self, moves=[self.moves[k] for k in np.flatnonzero(used)], numbers=self.numbers[used],
+            begin_s=self.begin_s[used], angles=self.angles[used], up=self.up[used], raw_angle=self.raw_angle[used],
+            duration_s=self.duration_s[used], hidden=self.hidden[used],
+        )  # fmt: skip
 
     def along(self, gyro: SensorCalibration) -> tuple[FloatArray, FloatArray]:
         """Angles (k,) [rad] about the vertical by a gyro, and their standard errors."""
-        raw, times = self.measured.raw_angle, self.measured.duration_s
+        raw, times = self.raw_angle, self.duration_s
         seen = np.sum(self.up * (raw @ gyro.S.T + np.outer(times, gyro.b)), axis=1)
         slope = np.hstack([(self.up[:, :, None] * raw[:, None, :]).reshape(-1, 9), self.up * times[:, None]])
         return seen, np.sqrt(np.einsum("ki,ij,kj->k", slope, gyro.covariance, slope))
 
     def rates(self) -> StatedRates:
         """The turns as mean rates of known size."""
-        measured, lasts_s = self.measured, self.measured.duration_s[:, None]
+        lasts_s = self.duration_s[:, None]
         return StatedRates(
-            mean=measured.raw_angle / lasts_s,
-            covariance=(measured.var_rate / lasts_s + measured.bias_spread)[:, :, None] * np.eye(3),
-            shared=measured.hidden / lasts_s[:, :, None],
-            speeds=np.abs(self.angles) / measured.duration_s,
-            unit=1.0 / measured.duration_s,
+            mean=self.raw_angle / lasts_s,
+            covariance=(self.variance / lasts_s**2)[:, :, None] * np.eye(3),
+            shared=self.hidden / lasts_s[:, :, None],
+            speeds=np.abs(self.angles) / self.duration_s,
+            unit=1.0 / self.duration_s,
         )
+
+    @property
+    def axes(self) -> IntArray:
+        """(k,) axis nearest to the vertical, from one."""
+        return np.asarray(np.argmax(np.abs(self.up), axis=1) + 1)
 
 
 def table_turns(
@@ -83,12 +117,17 @@ def table_turns(
         known = [(k, move, 0.0) for k, move in enumerate(level, start=1)]
     else:
         known = stated(recording, level, angles_deg)
-    names = [TurnName(k, float(recording.time_s[move.start])) for k, move, _ in known]
     moves = [move for _, move, _ in known]
-    measured = measure_turns(recording, moves, resting_spans(segments))
-    before = np.array([move.pose_before for move in moves], dtype=np.int64)
+    # Static poses are turns by 0°, which determine the bias.
+    still = [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2]
     return TableTurns(
-        names, moves, measured, np.array([angle for *_, angle in known]), up[before], angles_deg is not None
+        **vars(measure_turns(recording, moves, still)),
+        moves=moves,
+        numbers=np.array([k for k, *_ in known], dtype=np.int64),
+        begin_s=recording.time_s[[move.start for move in moves]],
+        angles=np.array([angle for *_, angle in known]),
+        up=up[np.array([move.pose_before for move in moves], dtype=np.int64)],
+        is_stated=angles_deg is not None,
     )
 
 
@@ -108,8 +147,14 @@ def by_quarters(turns: TableTurns, calibration: Calibration) -> tuple[TableTurns
         if np.all(is_told) or np.count_nonzero(is_told) <= n_told or not found.moves:
             break
         n_told, gyro = int(np.count_nonzero(is_told)), found.rates().scattered_on(calibration).gyroscope(gyro)
-    is_wrong, axes = is_told & ~is_used & (np.abs(seen) > LEAST_RAD), np.argmax(np.abs(turns.up), axis=1)
-    said = [no_multiple(turns.names[k], seen[k], int(axes[k])) for k in np.flatnonzero(is_wrong)]
+    is_wrong = is_told & ~is_used & (np.abs(seen) > LEAST_RAD)
+    said = [
+        Finding.of(
+            FindingCode.TURN_NOT_A_MULTIPLE, "no-multiple", turn=int(turns.numbers[k]), at_s=float(turns.begin_s[k]),
+            axis=int(turns.axes[k]), seen_rad=seen[k],
+        )
+        for k in np.flatnonzero(is_wrong)
+    ]  # fmt: skip
     return found, said if np.all(is_told) else [*said, Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)]
 
 
@@ -122,7 +167,7 @@ def on_stated_turns(
     """
     gyro, angles = calibration.gyroscope, turns.angles
     assert gyro is not None
-    rates, axes = turns.rates(), np.argmax(np.abs(turns.up), axis=1)
+    rates = turns.rates()
     is_reversed = turns.along(gyro)[0] * angles < 0.0
     if np.any(is_reversed) and not np.all(is_reversed):
         raise other_sense(is_reversed, angles)
@@ -135,16 +180,19 @@ def on_stated_turns(
         return replace(calibration, findings=(*calibration.findings, said)), turns.of(is_used)
     missed = (rates.predicted(updated.values)[0] - rates.speeds) / rates.unit
     found = [
-        wrong_turn(
-            turns.names[k], angles[k], int(axes[k]), missed[k], is_excluded=k in wrong, is_stated=turns.is_stated
+        Finding.of(
+            FindingCode.TURN_NOT_A_MULTIPLE, "left-out" if k in wrong else "contradicted", turn=int(turns.numbers[k]),
+            at_s=float(turns.begin_s[k]), is_stated=turns.is_stated, angle_rad=angles[k], axis=int(turns.axes[k]),
+            deviation_rad=abs(missed[k]),
         )
         for k in (*wrong, *either)
-    ]
-    found += loose_turns(updated.scatter)
+    ]  # fmt: skip
+    if updated.scatter > LOOSE_RAD:
+        found.append(Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=updated.scatter))
     # An error of a turn as large as it may be against a wall, which no other turn and no move contradicts.
     alone = np.sqrt(predicted.left_out(np.arange(len(angles)), 0.0 * angles)[1]) / rates.unit > SLACK_RAD
     if np.any(alone):
-        found.append(Finding.of(FindingCode.TURN_UNCHECKED, axes=sorted({int(axis) + 1 for axis in axes[alone]})))
+        found.append(Finding.of(FindingCode.TURN_UNCHECKED, axes=sorted(set(turns.axes[alone].tolist()))))
     rms = rms_of(missed[is_used])
     found.append(Finding.of(FindingCode.TURNTABLE, "turns", turns=int(np.count_nonzero(is_used)), rms_rad=rms))
     if np.all(is_reversed):
@@ -183,39 +231,6 @@ def contradicted(found: Updated, unit: FloatArray) -> tuple[list[int], list[int]
     return wrong, []
 
 
-# Turns as measured, and the angles that are stated.
-
-
-MIN_SPREAD = 0.2
-"""Smallest singular value of unit turn axes that determine all of S: three axes within some 10° of one plane have
-less."""
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredTurns:
-    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the ``bias`` (3,) at rest, and their noise.
-
-    ``var_rate`` (3,) is ``N²`` in raw unit² · s, ``bias_spread`` (3,) the variance of the true bias between intervals
-    without rotation. ``hidden`` (k, 3, m) are errors by rounding.
-    """
-
-    raw_angle: FloatArray
-    duration_s: FloatArray
-    bias: FloatArray
-    var_rate: FloatArray
-    bias_spread: FloatArray
-    hidden: FloatArray
-
-    def of(self, used: BoolArray) -> MeasuredTurns:
-        """The turns ``used`` (k,)."""
-        of_turns = self.raw_angle[used], self.duration_s[used]
-        return MeasuredTurns(*of_turns, self.bias, self.var_rate, self.bias_spread, self.hidden[used])
-
-    def turned(self) -> FloatArray:
-        """(k, 3) raw angles less those of the bias."""
-        return self.raw_angle - np.outer(self.duration_s, self.bias)
-
-
 def measure_turns(recording: Recording, turns: Sequence[Move], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
     """Integrate turns and static intervals; the noise is measured in the static intervals.
 
@@ -239,7 +254,10 @@ def measure_turns(recording: Recording, turns: Sequence[Move], static: Sequence[
     static_s = np.array(static_duration)[:, None]
     bias, _, spread = pool_biases(static_angle / static_s, var_rate / static_s)
     hidden = hidden_angles(gyroscope, step_s, quantum, edges, static_edges, raw_angle)
-    return MeasuredTurns(raw_angle, np.array(duration), bias, var_rate, spread, hidden)
+    return MeasuredTurns(
+        raw_angle=raw_angle, duration_s=np.array(duration), bias=bias, var_rate=var_rate, bias_spread=spread,
+        hidden=hidden,
+    )  # fmt: skip
 
 
 def other_sense(is_reversed: BoolArray, angles: FloatArray) -> InputError:
@@ -252,14 +270,14 @@ def other_sense(is_reversed: BoolArray, angles: FloatArray) -> InputError:
     )
 
 
-def scale_of_stated(raw: FloatArray, angles: FloatArray) -> FloatArray | None:
-    """Scale (3, 3), rad/s per raw unit, by a robust fit to raw angles (k, 3) of turns by ``angles`` (k, 3) [rad];
-    ``None`` where they do not span three axes.
+def scale_of_stated(turns: TableTurns) -> FloatArray | None:
+    """Scale (3, 3), rad/s per raw unit, by a robust fit to turns; ``None`` where they do not span three axes.
 
     Least absolute deviations (reweighted least squares) of ``φ'_i - z̄ Δt_i = S_w φ_i``.
     """
+    angles, raw = turns.angles[:, None] * turns.up, turns.raw_angle - np.outer(turns.duration_s, turns.bias)
     size: FloatArray = np.linalg.norm(angles, axis=1)
-    if not spans_three_axes(angles / size[:, None]):
+    if len(size) < 3 or np.linalg.svd(angles / size[:, None], compute_uv=False)[-1] < MIN_SPREAD:
         return None
     # Initial weights are equal in relative error; later ones are the inverse of the relative misfit.
     weight: FloatArray = 1.0 / size
@@ -270,11 +288,6 @@ def scale_of_stated(raw: FloatArray, angles: FloatArray) -> FloatArray | None:
     if np.linalg.cond(solution) > 1.0 / MIN_SPREAD:
         return None
     return np.asarray(np.linalg.inv(solution.T), dtype=np.float64)
-
-
-def spans_three_axes(directions: FloatArray) -> bool:
-    """Whether unit vectors (k, 3) along turns determine all of S."""
-    return len(directions) >= 3 and bool(np.linalg.svd(directions, compute_uv=False)[-1] >= MIN_SPREAD)
 
 
 def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float]) -> list[tuple[int, Move, float]]:
@@ -293,8 +306,3 @@ def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float])
         raise InputError("the angle of a turn must be finite")
     every = enumerate(zip(moves, angles_deg, strict=True), start=1)
     return [(k, move, math.radians(angle)) for k, (move, angle) in every if angle != 0.0]
-
-
-def resting_spans(segments: Segments) -> list[tuple[int, int]]:
-    """Half-open ranges of the static poses: turns by 0°, which determine the bias."""
-    return [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2]
