@@ -36,6 +36,12 @@ def turns(rng, n_moves=18, peak=12000.0, tremor=120.0, noise=3.0):
     return np.round(values + noise * rng.normal(size=values.shape))
 
 
+def n_clipped(readings):
+    """Number of gyro readings (n, 3) at a range limit."""
+    rows = np.arange(len(readings))
+    return bridge_clipping(Recording(rows / RATE_HZ, None, readings, RATE_HZ), rows)[2].sum()
+
+
 def test_a_pair_at_the_end_of_the_codes_is_a_limit_and_elsewhere_is_none():
     bump = turns(np.random.default_rng(4), n_moves=4, peak=3000.0)
     # A move of a quarter of a second of which two samples are beyond the end: as brisk hands do.
@@ -44,8 +50,7 @@ def test_a_pair_at_the_end_of_the_codes_is_a_limit_and_elsewhere_is_none():
     elsewhere = bump.copy()
     elsewhere[403:405, 1] = 32701.0
     for counts, n in ((bump, 2), (elsewhere, 0)):
-        found = bridge_clipping(Recording(np.arange(len(counts)) / RATE_HZ, None, counts, RATE_HZ))
-        assert (0 if found is None else found.is_clipped.sum()) == n
+        assert n_clipped(counts) == n
 
 
 @pytest.mark.parametrize(("pose_s", "ramp_s"), [(0.5, 0.05), (3.0, 0.3)])
@@ -62,8 +67,7 @@ def test_a_steady_turn_of_a_table_under_a_coarse_converter_is_not_at_a_limit(pos
             parts += [rng.uniform(20, 120) * rng.choice([-1, 1]) * turned, np.zeros(200)]
         rate = np.outer(np.concatenate(parts), [0.05, -0.1, 1.0]) + rng.uniform(-2.0, 2.0, 3)
         codes = np.round((rate + 0.02 * rng.normal(size=rate.shape)) / quantum) * quantum
-        found = bridge_clipping(Recording(np.arange(len(codes)) / RATE_HZ, None, codes, RATE_HZ))
-        assert found is None, seed
+        assert n_clipped(codes) == 0, seed
 
 
 def test_hands_beyond_the_limit_of_a_coarse_converter_are_seen_still():
@@ -78,8 +82,7 @@ def test_hands_beyond_the_limit_of_a_coarse_converter_are_seen_still():
             parts += [180.0 * bump[:, None] * along + shake[:, None], np.zeros((300, 3))]
         rate = np.concatenate(parts) + rng.uniform(-2.0, 2.0, 3)
         codes = np.clip(np.round((rate + 0.02 * rng.normal(size=rate.shape)) / 0.5) * 0.5, -100.0, 100.0)
-        found = bridge_clipping(Recording(np.arange(len(codes)) / RATE_HZ, None, codes, RATE_HZ))
-        assert found is not None, seed
+        assert n_clipped(codes) > 0, seed
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.3])

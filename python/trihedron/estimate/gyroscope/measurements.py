@@ -72,7 +72,7 @@ class MoveMeasurements:
     bias_read: FloatArray
     var_bias_read: FloatArray
     var_reading_noise: FloatArray
-    reading_variance: FloatArray | None
+    reading_variance: FloatArray
     quantum: FloatArray
     is_hidden: FloatArray
     shared_errors: FloatArray
@@ -150,11 +150,8 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     var_bias, var_reading = segments.gyroscope_sigma_mean**2, segments.accelerometer_sigma_mean**2
     scatter = np.full(3, np.inf) if segments.gyroscope_sigma is None else segments.gyroscope_sigma
     undithered = undithered_axes(quantum, scatter)
-    rate = gyroscope[rows].copy()
-    clipped = bridge_clipping(recording)
-    extra, hidden, shared = _rounded(gyroscope, quantum, gyroscope_mean, undithered, (in_log, rows))
-    if clipped is not None:
-        rate, extra = _bridged(rate, extra, clipped, gyroscope, rows)
+    rate, of_bridge, is_clipped = bridge_clipping(recording, rows)
+    of_rounding, hidden, shared = _rounded(gyroscope, quantum, gyroscope_mean, undithered, (in_log, rows))
     time_s = recording.time_s[rows]
     bias_read, var_bias_read = bias, var_bias
     mean, excess, _ = pool_biases(bias, var_bias)
@@ -181,7 +178,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         noise_density=density,
         sigma_time_s=jitter,
         nominal_step_s=nominal,
-        clipped_s=clipped_time(clipped, in_log, nominal),
+        clipped_s=np.array([nominal * np.count_nonzero(is_clipped[a:b].any(axis=1)) for a, b in edges]),
         is_gapped=np.array([np.max(np.diff(time_s[a:b]), initial=0.0) > GAP_STEPS * nominal for a, b in edges]),
         bias_excess=excess,
         rate=rate,
@@ -190,7 +187,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         bias_read=bias_read,
         var_bias_read=var_bias_read,
         var_reading_noise=var_reading,
-        reading_variance=extra,
+        reading_variance=np.where(is_clipped, of_bridge, of_rounding),
         quantum=quantum,
         is_hidden=hidden,
         shared_errors=shared,
@@ -199,9 +196,9 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
 
 def _rounded(
     readings: FloatArray, quantum: FloatArray, means: FloatArray, axes: BoolArray, where: tuple[IntArray, IntArray]
-) -> tuple[FloatArray | None, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rounding of undithered ``axes`` (3,) in moves, ``where`` (their edges in the log, rows (k,) of the log): variance
-    (k, 3) or ``None`` without such axes, 1 where a reading is in the LSB of its bias (k, 3), shared errors (k, 3, j).
+    (k, 3), 1 where a reading is in the LSB of its bias (k, 3), shared errors (k, 3, j).
 
     ``means`` (n, 3) are those of the poses.
     """
@@ -209,7 +206,7 @@ def _rounded(
     coarse = readings, quantum, static_reading(means, quantum), axes
     variance = rounding_variance(*coarse)
     if variance is None:
-        return None, np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 0))
+        return np.zeros((len(rows), 3)), np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 0))
     is_static = resting_ends(*coarse, in_log) | resting_axes(*coarse)
     variance = np.maximum(variance, unseen_rotation(is_static, quantum, in_log))
     return variance[rows], is_static[rows].astype(np.float64), shared_errors(*coarse)[rows]
@@ -224,15 +221,6 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
     if moves[-1].stop > recording.n_samples or segments.poses[-1].stop > recording.n_samples:
         raise InputError("the segments reach beyond the recording: they belong to another log")
     return moves
-
-
-def _bridged(
-    rate: FloatArray, extra: FloatArray | None, clipped: Clipped, gyroscope: FloatArray, rows: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Rates at ``rows`` with clipped readings replaced, and their variance with that of the replacements."""
-    is_clipped, variance = clipped.is_clipped[rows], clipped.variance[rows]
-    rate = np.where(is_clipped, rate + clipped.readings[rows] - gyroscope[rows], rate)
-    return rate, variance if extra is None else variance + np.where(is_clipped, 0.0, extra)
 
 
 def _by_codes(
@@ -285,59 +273,46 @@ DOUBT = 0.5
 """Standard uncertainty of the bridged area above the range limit, relative to that area."""
 
 
-@dataclass(frozen=True, eq=False)
-class Clipped:
-    """``is_clipped`` (n, 3), raw ``readings`` (n, 3) with the peaks bridged, ``variance`` (n, 3) of each bridged
-    reading, raw²."""
-
-    is_clipped: BoolArray
-    readings: FloatArray
-    variance: FloatArray
-
-
-def bridge_clipping(recording: Recording) -> Clipped | None:
-    """Replace the gyro's clipped runs by the cubic that continues the slopes on both sides; ``None`` without a limit.
+def bridge_clipping(recording: Recording, rows: IntArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Gyro readings at ``rows`` (k,) with clipped runs replaced by the cubic that continues the slopes on both sides:
+    readings (k, 3), their variances (k, 3) by the replacement, raw², and which are replaced (k, 3).
 
     A cubic with slopes ``s₁, s₂`` at the ends of a run of length ``T`` has the area ``T² (s₁ − s₂)/12`` above the
-    chord; its standard uncertainty is ``DOUBT`` of it. Raises ``InputError`` when the recording has no gyroscope.
+    chord; its standard uncertainty is ``DOUBT`` of it.
     """
-    facts, gyroscope = recording.facts.of("gyroscope"), recording.gyroscope
-    if gyroscope is None or not facts.limits:
-        return None
-    readings, variance = gyroscope.copy(), np.zeros(gyroscope.shape)
-    for limit in facts.limits:
+    gyroscope = recording.gyroscope
+    assert gyroscope is not None
+    rate = gyroscope[rows]
+    variance, is_clipped = np.zeros(rate.shape), np.zeros(rate.shape, dtype=bool)
+    for limit in recording.facts.of("gyroscope").limits:
         for first, stop in limit.runs.tolist():
-            _bridge(recording.time_s, readings[:, limit.axis], variance[:, limit.axis], first, stop - 1)
-    return Clipped(facts.at_limits(len(gyroscope)), readings, variance)
+            at = np.flatnonzero((rows >= first) & (rows < stop))
+            is_clipped[at, limit.axis] = True
+            found = _bridge(recording.time_s, gyroscope[:, limit.axis], first, stop - 1) if len(at) else None
+            if found is not None:
+                rate[at, limit.axis], variance[at, limit.axis] = found[0][rows[at] - first], found[1]
+    return rate, variance, is_clipped
 
 
-def clipped_time(clipped: Clipped | None, edges: IntArray, step_s: float) -> FloatArray:
-    """Time (m,) in each move with any axis at the range limit, s."""
-    if clipped is None:
-        return np.zeros(len(edges))
-    any_axis = np.any(clipped.is_clipped, axis=1)
-    return np.array([step_s * float(np.count_nonzero(any_axis[a:b])) for a, b in edges])
-
-
-def _bridge(time_s: FloatArray, column: FloatArray, variance: FloatArray, first: int, last: int) -> None:
+def _bridge(time_s: FloatArray, column: FloatArray, first: int, last: int) -> tuple[FloatArray, float] | None:
+    """Readings from ``first`` to ``last`` on the cubic, and the variance of each; ``None`` at an end of the log."""
     left, right = first - 1, last + 1
     if left < 1 or right > len(column) - 2:
-        return
+        return None
     span = time_s[right] - time_s[left]
     before, after = time_s[left] - time_s[left - 1], time_s[right + 1] - time_s[right]
     if span <= 0.0 or before <= 0.0 or after <= 0.0:
-        return
+        return None
     enter = (column[left] - column[left - 1]) / before
     leave = (column[right + 1] - column[right]) / after
     # The Hermite cubic: SciPy has it, and takes longer to load than a calibration does.
     u = (time_s[first : last + 1] - time_s[left]) / span
-    column[first : last + 1] = (
+    readings = (
         (2 * u**3 - 3 * u**2 + 1) * column[left]
         + (u**3 - 2 * u**2 + u) * span * enter
         + (3 * u**2 - 2 * u**3) * column[right]
         + (u**3 - u**2) * span * leave
     )
-    area = span**2 * abs(enter - leave) / 12.0
-    count = last - first + 1
+    area, count = span**2 * abs(enter - leave) / 12.0, last - first + 1
     # Equal and independent variances of the run's samples, whose integral has the variance of the area.
-    variance[first : last + 1] = (DOUBT * area) ** 2 / count / (span / (count + 1)) ** 2
+    return readings, float((DOUBT * area) ** 2 / count / (span / (count + 1)) ** 2)

@@ -94,10 +94,9 @@ def arranged(
     force, rate = (sharpened(values, measured.time_s, EITHER) for values in (readings, measured.rate))
     assert noise.pose_rate_sigma is not None
     assert noise.rate_density is not None
-    if measured.reading_variance is not None:
-        # Variance of rounding and of bridged clipping, in addition to that of any session.
-        for k, (a, b) in enumerate(ranges):
-            unresolved[k, 3] += measured.reading_variance[a:b].sum(axis=0) * measured.nominal_step_s**2
+    # Variance of rounding and of bridged clipping, in addition to that of any session.
+    for k, (a, b) in enumerate(ranges):
+        unresolved[k, 3] += measured.reading_variance[a:b].sum(axis=0) * measured.nominal_step_s**2
     pose_time_s = np.ascontiguousarray(segments.time_mid_s, dtype=np.float64)
     # Undithered readings: noise and drift; the position of the bias inside the LSB is a column.
     is_coarse, coarse = measured.is_undithered, np.flatnonzero(measured.is_undithered)
