@@ -94,15 +94,15 @@ def fit_case(
     leans are those of the largest restricted likelihood with their priors.
     """
     known = {name: FLAT_RAD for name in poses.leans if name not in OF_TABLE}
-    level = _solved(values, covariance, free, poses, known)
+    level = solved(values, covariance, free, poses, known)
     is_level = level.dof <= 0 or level.chi2 <= chdtri(level.dof, SIGNIFICANCE)
     rows = poses if turns is None else poses.beside(turns)
     of_table = {} if is_level else {name: LEAN_RAD for name in rows.leans if name in OF_TABLE}
     sizes = {name: FLAT_RAD for name in rows.leans if name not in OF_TABLE} | of_table
-    fit = _solved(values, covariance, free, rows, sizes)
+    fit = solved(values, covariance, free, rows, sizes)
     for _ in range(ROUNDS if sizes else 0):
         last, sizes = sizes, {name: _size(fit, rows.leans[name], name) for name in sizes}
-        fit = _solved(values, covariance, free, rows, sizes)
+        fit = solved(values, covariance, free, rows, sizes)
         if all(abs(sizes[name] / last[name] - 1.0) < SETTLED for name in sizes):
             break
     return replace(fit, chi2=level.chi2, dof=level.dof)
@@ -117,9 +117,10 @@ def _size(fit: CaseFit, columns: FloatArray, name: str) -> float:
     return math.sqrt((dof * FLAT_RAD**2 + float(squares)) / (dof + columns.shape[1]))
 
 
-def _solved(
+def solved(
     values: FloatArray, covariance: FloatArray, free: FloatArray, rows: CaseRows, sizes: dict[str, float]
 ) -> CaseFit:
+    """Parameters ``values`` (p,) with their ``covariance``, updated with rows whose leans have these ``sizes``."""
     together = rows.slope @ covariance @ rows.slope.T + rows.noise
     for name, size in sizes.items():
         together += size**2 * rows.leans[name] @ rows.leans[name].T

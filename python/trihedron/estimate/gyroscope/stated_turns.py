@@ -14,7 +14,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
-from trihedron.estimate.gyroscope.turntable import StatedRates, Updated, not_fitted
+from trihedron.estimate.gyroscope.turntable import StatedRates, moved_to, not_fitted, with_parameters
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
 from trihedron.records import Calibration, Finding, FindingCode, Move, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import correct
@@ -146,7 +146,8 @@ def by_quarters(turns: TableTurns, calibration: Calibration) -> tuple[TableTurns
         found = replace(turns, angles=angles).of(is_used)
         if np.all(is_told) or np.count_nonzero(is_told) <= n_told or not found.moves:
             break
-        n_told, gyro = int(np.count_nonzero(is_told)), found.rates().scattered_on(calibration).gyroscope(gyro)
+        n_told, updated = int(np.count_nonzero(is_told)), found.rates().scattered_on(calibration)
+        gyro = with_parameters(gyro, updated.values[12:], updated.covariance[12:, 12:])
     is_wrong = is_told & ~is_used & (np.abs(seen) > LEAST_RAD)
     said = [
         Finding.of(
@@ -171,8 +172,7 @@ def on_stated_turns(
     is_reversed = turns.along(gyro)[0] * angles < 0.0
     if np.any(is_reversed) and not np.all(is_reversed):
         raise other_sense(is_reversed, angles)
-    predicted = rates.on(calibration)
-    wrong, either = contradicted(predicted, rates.unit)
+    wrong, either = contradicted(rates, calibration)
     is_used = ~np.isin(np.arange(len(angles)), wrong)
     updated = rates.of(is_used).scattered_on(calibration)
     if not updated.is_fitted:
@@ -190,32 +190,31 @@ def on_stated_turns(
     if updated.scatter > LOOSE_RAD:
         found.append(Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=updated.scatter))
     # An error of a turn as large as it may be against a wall, which no other turn and no move contradicts.
-    alone = np.sqrt(predicted.left_out(np.arange(len(angles)), 0.0 * angles)[1]) / rates.unit > SLACK_RAD
+    alone = np.sqrt(left_out(rates, calibration)[1]) / rates.unit > SLACK_RAD
     if np.any(alone):
         found.append(Finding.of(FindingCode.TURN_UNCHECKED, axes=sorted(set(turns.axes[alone].tolist()))))
     rms = rms_of(missed[is_used])
     found.append(Finding.of(FindingCode.TURNTABLE, "turns", turns=int(np.count_nonzero(is_used)), rms_rad=rms))
     if np.all(is_reversed):
         found.append(Finding.of(FindingCode.LEFT_HANDED, "turns-against-moves", turns=len(angles)))
-    after = updated.of(calibration, recording, segments)
+    after = moved_to(calibration, updated.values, updated.covariance, recording, segments)
     return replace(after, findings=(*calibration.findings, *found)), turns.of(is_used)
 
 
-def contradicted(found: Updated, unit: FloatArray) -> tuple[list[int], list[int]]:
+def contradicted(rates: StatedRates, calibration: Calibration) -> tuple[list[int], list[int]]:
     """Turns that the others show to be wrong, and those of which some are, undecided which.
 
     Each turn is predicted by all others and what was known before. Their scatter is estimated from the median squared
-    error, which is robust to single wrong turns; ``unit`` (k,) is the change of each row by a scatter of one.
+    error, which is robust to single wrong turns.
     """
-    used = np.arange(len(unit))
+    used = np.arange(len(rates.unit))
     wrong: list[int] = []
-    error, variance = found.left_out(used, 0.0 * unit)
-    scatter2 = float(np.median((error / unit) ** 2) / MEDIAN_CHI2[1] - np.median(variance / unit**2))
-    loose = np.sqrt(max(scatter2, 0.0)) * unit
-    limit = chdtri(1.0, FALSE_ALARM / len(unit))
+    error, variance = left_out(rates, calibration)
+    scatter2 = float(np.median((error / rates.unit) ** 2) / MEDIAN_CHI2[1] - np.median(variance / rates.unit**2))
+    loose, limit = math.sqrt(max(scatter2, 0.0)), chdtri(1.0, FALSE_ALARM / len(used))
 
     def far(used: IntArray) -> tuple[IntArray, int]:
-        error, variance = found.left_out(used, loose)
+        error, variance = left_out(rates.of(np.isin(np.arange(len(rates.unit)), used)), calibration, loose)
         return used[error**2 > limit * variance], int(used[np.argmax(error**2 / variance)])
 
     while len(used) > 1:
@@ -229,6 +228,12 @@ def contradicted(found: Updated, unit: FloatArray) -> tuple[list[int], list[int]
         wrong.append(worst)
         used = used[used != worst]
     return wrong, []
+
+
+def left_out(rates: StatedRates, calibration: Calibration, scatter: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Error (k,) of each rate as the others predict it, and its variance (k,)."""
+    error, covariance = rates.on(calibration, scatter).left_out(np.arange(len(rates.unit))[:, None])
+    return error[:, 0], covariance[:, 0, 0]
 
 
 def measure_turns(recording: Recording, turns: Sequence[Move], static: Sequence[tuple[int, int]]) -> MeasuredTurns:

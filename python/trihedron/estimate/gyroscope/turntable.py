@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
+from trihedron.arrays import BoolArray, FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.norm import gravity_quality
+from trihedron.estimate.case_frame import CaseFit, CaseRows, solved
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by, move_quality, without_g_sensitivity
 from trihedron.probability import FALSE_ALARM, fdtrc
@@ -26,6 +27,7 @@ from trihedron.session.noise import NOISE_DOF
 from trihedron.session.rounding import undithered_axes
 
 ITERATIONS = 20
+SCATTER = "scatter"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,89 +57,48 @@ class StatedRates:
 
     def on(self, calibration: Calibration, scatter: float = 0.0) -> Updated:
         """The calibration updated with these rates of so much ``scatter``, relinearised until it converges."""
-        start, prior = parameters_of(calibration), calibration.covariance
+        start, none = parameters_of(calibration), np.zeros((24, 0))
         by_reading = self.predicted(start)[1][:, 21:] @ start[12:21].reshape(3, 3)
         own = np.einsum("ki,kij,kj->k", by_reading, self.covariance, by_reading)
         together = np.einsum("ki,kim->km", by_reading, self.shared)
-        noise = np.diag(own + (scatter * self.unit) ** 2) + together @ together.T
-        noise += np.outer(self.speeds, self.speeds) * self.relative_sigma**2
+        noise = np.diag(own) + together @ together.T + np.outer(self.speeds, self.speeds) * self.relative_sigma**2
         values = start
         for _ in range(ITERATIONS):
             speed, slope = self.predicted(values)
-            innovation = slope @ prior @ slope.T + noise
-            gain = prior @ slope.T @ np.linalg.inv(innovation)
-            misfit = self.speeds - speed + slope @ (values - start)
-            last, values = values, start + gain @ misfit
+            rows = CaseRows(slope, self.speeds - speed + slope @ values, noise, {SCATTER: np.diag(self.unit)})
+            fit = solved(start, calibration.covariance, none, rows, {SCATTER: scatter})
+            last, values = values, fit.values
             if np.max(np.abs(values - last)[12:]) <= 1e-12 * np.max(np.abs(start[12:])):
                 break
-        posterior = prior - gain @ slope @ prior
-        covariance = 0.5 * (posterior + posterior.T)
         left = self.speeds - self.predicted(values)[0]
-        chi2 = float(left @ np.linalg.solve(noise, left))
+        chi2 = float(left @ np.linalg.solve(noise + np.diag((scatter * self.unit) ** 2), left))
         is_fitted = fdtrc(float(len(left)), NOISE_DOF, chi2 / len(left)) >= FALSE_ALARM
-        return Updated(
-            misfit=misfit,
-            innovation=innovation,
-            values=values,
-            covariance=covariance,
-            scatter=scatter,
-            left=left,
-            is_fitted=is_fitted,
-        )
+        return Updated(**vars(fit), left=left, is_fitted=is_fitted)
 
     def scattered_on(self, calibration: Calibration) -> Updated:
-        """The calibration updated with these rates, and with the scatter that they show."""
-        found = self.on(calibration)
-        scatter = found.shown_scatter(self.unit)
-        return self.on(calibration, scatter) if scatter > 0.0 else found
+        """The calibration updated with these rates, and with the scatter that they show: that with which χ² is its
+        degrees of freedom, where they deviate by more than all known errors."""
+        found, dof = self.on(calibration), len(self.speeds)
+        if dof < 1 or fdtrc(float(dof), NOISE_DOF, found.chi2 / dof) >= FALSE_ALARM:
+            return found
+        from scipy.optimize import brentq
+
+        most = 2.0 * float(np.sqrt(np.sum((found.misfit / self.unit) ** 2) / dof))
+        return self.on(calibration, float(brentq(lambda one: self.on(calibration, one).chi2 - dof, 0.0, most)))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Updated:
-    """``misfit`` (k,) of rates as predicted by what was known before them, with its covariance ``innovation`` (k, k).
+@dataclass(frozen=True, eq=False)
+class Updated(CaseFit):
+    """Parameters of both sensors (24,), updated with rates; ``left`` (k,) [rad/s] of these differs from them, by no
+    more than their noise and scatter where the update ``is_fitted``."""
 
-    Parameters of both sensors ``values`` (24,) with their ``covariance`` (24, 24), and the ``scatter`` of the rates
-    [rad/s], which the session predicts. ``left`` (k,) [rad/s] of the rates differs from these parameters, by no more
-    than their noise where the update ``is_fitted``."""
-
-    misfit: FloatArray
-    innovation: FloatArray
-    values: FloatArray
-    covariance: FloatArray
-    scatter: float
     left: FloatArray
     is_fitted: bool
 
-    def left_out(self, used: IntArray, further: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Error (n,) of each row ``used`` (n,) as the others predict it, and its variance (n,); ``further`` (k,) are
-        standard errors of all rows beside the known ones."""
-        inverse = np.linalg.inv((self.innovation + np.diag(further**2))[np.ix_(used, used)])
-        variance = 1.0 / np.diag(inverse)
-        return inverse @ self.misfit[used] * variance, variance
-
-    def shown_scatter(self, unit: FloatArray) -> float:
-        """Scatter of rows that deviate by more than all known errors, else 0: with it χ² is its degrees of freedom.
-        ``unit`` (k,) is the change of each row by a scatter of one."""
-        dof = len(self.misfit)
-
-        def chi2(scatter: float) -> float:
-            covariance = self.innovation + np.diag((scatter * unit) ** 2)
-            return float(self.misfit @ np.linalg.solve(covariance, self.misfit))
-
-        if dof < 1 or fdtrc(float(dof), NOISE_DOF, chi2(0.0) / dof) >= FALSE_ALARM:
-            return 0.0
-        from scipy.optimize import brentq
-
-        most = float(np.sqrt(np.sum((self.misfit / unit) ** 2) / dof))
-        return float(brentq(lambda one: chi2(one) - dof, 0.0, most))
-
-    def gyroscope(self, before: SensorCalibration) -> SensorCalibration:
-        """The gyro with these parameters."""
-        return _with(before, self.values[12:], self.covariance[12:, 12:])
-
-    def of(self, calibration: Calibration, recording: Recording, segments: Segments) -> Calibration:
-        """The calibration with these parameters."""
-        return moved_to(calibration, self.values, self.covariance, recording, segments)
+    @property
+    def scatter(self) -> float:
+        """Scatter of the rates, which the session predicts, in changes of one."""
+        return self.sizes[SCATTER]
 
 
 def moved_to(
@@ -150,8 +111,8 @@ def moved_to(
     cost = float(shift @ np.linalg.pinv(calibration.covariance, hermitian=True) @ shift)
     after = replace(
         calibration,
-        accelerometer=_with(calibration.accelerometer, values[:12], covariance[:12, :12]),
-        gyroscope=_with(calibration.gyroscope, values[12:], covariance[12:, 12:]),
+        accelerometer=with_parameters(calibration.accelerometer, values[:12], covariance[:12, :12]),
+        gyroscope=with_parameters(calibration.gyroscope, values[12:], covariance[12:, 12:]),
         covariance=covariance,
     )
     return with_own_residuals(after, recording, segments, cost)
@@ -165,7 +126,8 @@ def parameters_of(calibration: Calibration) -> FloatArray:
     return np.concatenate([accelerometer.S.ravel(), accelerometer.b, gyro.S.ravel(), gyro.b])
 
 
-def _with(sensor: SensorCalibration, values: FloatArray, covariance: FloatArray) -> SensorCalibration:
+def with_parameters(sensor: SensorCalibration, values: FloatArray, covariance: FloatArray) -> SensorCalibration:
+    """The sensor with parameters ``values`` (12,) and their ``covariance``."""
     return replace(sensor, S=values[:9].reshape(3, 3), b=values[9:], covariance=covariance)
 
 
@@ -295,7 +257,7 @@ def on_turntable(
     if not updated.is_fitted:
         return replace(calibration, findings=(*calibration.findings, not_fitted(rates, updated, is_turned=False)))
     said = _said(rates, updated, rates.predicted(parameters_of(calibration))[0])
-    after = updated.of(calibration, recording, segments)
+    after = moved_to(calibration, updated.values, updated.covariance, recording, segments)
     return replace(after, findings=(*calibration.findings, said))
 
 
