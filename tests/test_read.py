@@ -111,7 +111,6 @@ def test_words_for_missing_become_nan_and_are_counted_and_a_column_of_words_is_l
 
 def test_a_log_longer_than_one_block_is_read_whole_and_lines_stay_right(tmp_path, monkeypatch):
     monkeypatch.setattr(text_module, "BLOCK_BYTES", 4096)
-    monkeypatch.setattr(text_module, "_PIECE_BYTES", 1000)
     table = readings(3000)
     path = write(tmp_path / "log.csv", table)
     seen = []

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from test_read import HEADER, readings, text_module, write
+from test_read import HEADER, readings, write
 from trihedron.read import ReadError, read_recording
 from trihedron.read.errors import stderr_without
 from trihedron.read.memory import check_memory
@@ -106,7 +106,7 @@ def test_what_is_not_a_file_no_rate_and_pickled_objects_are_said(tmp_path):
             read_recording(path, rate_hz=rate)
 
 
-@pytest.mark.parametrize("opener", ["access", "open", "read"])
+@pytest.mark.parametrize("opener", ["access", "open"])
 def test_no_permission_and_an_error_of_the_disk_are_said(tmp_path, monkeypatch, opener):
     path = write(tmp_path / "log.csv", readings())
 
@@ -115,10 +115,8 @@ def test_no_permission_and_an_error_of_the_disk_are_said(tmp_path, monkeypatch, 
 
     if opener == "access":
         monkeypatch.setattr("os.access", lambda *_: False)
-    elif opener == "open":
-        monkeypatch.setattr("pathlib.Path.open", broken)
     else:
-        monkeypatch.setattr(text_module, "open_binary", broken)
+        monkeypatch.setattr("pathlib.Path.open", broken)
     with pytest.raises(ReadError, match="no permission to read" if opener == "access" else "Input/output error"):
         read_recording(path)
 

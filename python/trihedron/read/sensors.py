@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.probability import bdtrc
-from trihedron.read.clock.base import PART, Clock, build_clock, in_order
+from trihedron.read.clock.base import PART, Clock, build_clock
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
@@ -20,7 +21,6 @@ from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
-from trihedron.read.text.store import side_by_side
 from trihedron.read.time_column import reject_unread_time, summed_steps, with_arrivals
 from trihedron.records import Finding, FindingCode, Sampling, Severity
 from trihedron.records.progress import Progress
@@ -99,15 +99,7 @@ def _triad(
 ) -> FloatArray | None:
     if triad is None:
         return None
-    together = side_by_side([table.columns[column] for column in triad])
-    if together is not None and rows is None:
-        return together
-    if together is not None and rows is not None and table.is_private:
-        # To save memory for a long log the columns are reordered in place, one after the other.
-        for k in range(3):
-            in_order(together[:, k].copy(), rows, together[: len(rows), k])
-        return together[: len(rows)]
-    out = np.empty((table.n_rows if rows is None else len(rows), 3))
+    out = _core.new_array(table.n_rows if rows is None else len(rows), 3)
     for k, column in enumerate(triad):
         values = table.columns[column]
         if not len(values):
@@ -252,7 +244,6 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
             given,
             chosen.nanoseconds,
             _witness(table, chosen),
-            table.is_private,
         )
         findings += clock.findings
         rate = mean_rate_hz(clock.time_s)

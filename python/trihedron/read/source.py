@@ -1,13 +1,15 @@
 """Any supported file as tables of numbers; the format is recognised by the first bytes, never by the name."""
 
+import hashlib
 import re
 from pathlib import Path
 
 from trihedron.read.archive import read_npy
 from trihedron.read.binary import read_binary, ros
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.errors import ReadError, check_readable, first_bytes
+from trihedron.read.errors import ReadError, check_readable, errors_of_system, first_bytes
 from trihedron.read.kitti import oxts_folder, read_kitti
+from trihedron.read.memory import check_unpacked
 from trihedron.read.table import Table
 from trihedron.read.zipped import read_zip
 from trihedron.records.progress import Progress
@@ -85,8 +87,11 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
         return known
     reject_foreign(path, magic)
     # The library for tables is large, and arrays do not need it.
-    from trihedron.read.text.blocks import TextFile, compression_of
+    from trihedron.read.text.blocks import unpacked
     from trihedron.read.text.open import read_text
 
-    tables = read_text(TextFile(path, size, compression_of(magic), progress))
+    check_unpacked(path, size, size)
+    with errors_of_system(path), path.open("rb") as stream:
+        data = stream.read()
+    tables = read_text(path, unpacked(path, data), hashlib.sha256(data).hexdigest(), progress)
     return by_sensor(tables[0]) if len(tables) == 1 else tables

@@ -51,8 +51,6 @@ class Table:
     clock: StatedClock = field(default_factory=StatedClock)
     onboard: Onboard | None = None
     rows_in_file: int = 0
-    is_private: bool = False
-    """The reader created the arrays and nothing else uses them, so that rows may be reordered in place."""
     is_chosen: bool = False
     """The user's choice of topic and instance was already applied when this table was read."""
 

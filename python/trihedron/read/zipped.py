@@ -85,7 +85,6 @@ def _member(
     path: Path, archive: zipfile.ZipFile, name: str, sha256: str, progress: Progress | None, is_of_several: bool
 ) -> tuple[Table, ...]:
     # Parsing needs a large library, which a NumPy archive does not.
-    from trihedron.read.text.blocks import TextFile
     from trihedron.read.text.open import read_text
 
     info = archive.getinfo(name)
@@ -97,7 +96,7 @@ def _member(
         raise ReadError(f"{path}: its member {name} is not as long as the archive says; export it again.")
     if not content.strip():
         raise ReadError(f"{path}: its member {name} is empty; record or export again.")
-    tables = read_text(TextFile(path / name, len(content), None, progress, content, sha256))
+    tables = read_text(path / name, content, sha256, progress)
     if len(tables) == 1:
         tables = by_sensor(tables[0])
     if is_of_several and len(tables) == 1:

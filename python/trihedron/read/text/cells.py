@@ -28,27 +28,42 @@ MAX_WORDS = 64
 
 @dataclass
 class TextColumn:
-    """A column without numbers: ``form`` of its dates or "", and the distinct ``words`` so far, in order."""
+    """A column without numbers: ``form`` of its dates or "", an example, and its cells so far (not those of dates)."""
 
     example: str
     form: str = ""
-    words: dict[str, int] = field(default_factory=dict)
-    codes: list[IntArray] = field(default_factory=list)
+    cells: list[pl.Series] = field(default_factory=list)
 
-    def encode(self, cells: pl.Series) -> None:
-        """Store the index of each row's word, unless there are too many words for labels."""
+    @property
+    def is_time(self) -> bool:
+        """Whether the cells are times."""
+        return self.form not in ("", "date")
+
+    def add(self, cells: pl.Series) -> FloatArray | float:
+        """Cells of dates as (n,) seconds; NaN for words, whose cells are kept."""
+        if self.is_time:
+            return seconds(cells, self.form)
+        self.cells.append(cells)
+        return np.nan
+
+    def past_midnight(self, time_s: FloatArray) -> FloatArray:
+        """Times of day [s] continued after midnight (a step back by more than half a day is a new day), or dates."""
+        if self.form != "time-of-day":
+            return time_s
+        step = np.diff(time_s, prepend=time_s[:1])
+        with np.errstate(invalid="ignore"):
+            return np.asarray(time_s + _DAY_S * np.cumsum(step < -0.5 * _DAY_S), dtype=np.float64)
+
+    def labels(self) -> tuple[tuple[str, ...], IntArray] | None:
+        """Distinct words in order, and the index (n,) of each row's word; None where too many are distinct."""
         import polars as pl
 
-        if len(self.words) > MAX_WORDS:
-            return
-        text = cells.fill_null("").str.strip_chars(' "')
-        for word in text.unique(maintain_order=True):
-            self.words.setdefault(word, len(self.words))
-        if len(self.words) > MAX_WORDS:
-            self.codes.clear()
-            return
-        mapped = text.replace_strict(list(self.words), list(self.words.values()), return_dtype=pl.Int64)
-        self.codes.append(np.asarray(mapped.to_numpy(), dtype=np.int64))
+        text = pl.concat(self.cells).fill_null("").str.strip_chars(' "')
+        words = text.unique(maintain_order=True).to_list()
+        if len(words) > MAX_WORDS:
+            return None
+        codes = text.replace_strict(words, list(range(len(words))), return_dtype=pl.Int64)
+        return tuple(words), np.asarray(codes.to_numpy(), dtype=np.int64)
 
 
 def parse(path: Path, data: bytes, layout: Layout, first_line: int) -> list[pl.Series]:
@@ -88,24 +103,19 @@ def numbers(cells: pl.Series, decimal_comma: bool) -> tuple[FloatArray, pl.Serie
 def text_column(cells: pl.Series, values: FloatArray, words: pl.Series, name: str, n_before: int) -> TextColumn | None:
     """The column of dates or words that cells are, ``words`` being the mask of those that are no numbers.
 
-    In the first block most of the first cells are words. After ``n_before`` empty cells, and where none is a number,
-    words are occasional remarks, unless numbers are expected by the name. None for a column of numbers.
+    In the first block most of the first cells are words. After ``n_before`` empty cells, and where none of ``values``
+    so far is a number, words are occasional remarks, unless numbers are expected by the name. None for a column of
+    numbers.
     """
+    import polars as pl
+
     is_first = words.head(JUDGED)
     if n_before == 0 and is_first.sum() > 0.5 * len(is_first):
         first = cells.head(JUDGED).filter(is_first)
         return TextColumn(first[0], form_of(first) or "")
     if not name or parse_name(name).role or not np.isnan(values).all():
         return None
-    return TextColumn(cells.filter(words)[0], words={"": 0}, codes=[np.zeros(n_before, dtype=np.int64)])
-
-
-def not_numbers(cells: pl.Series, column: TextColumn) -> FloatArray:
-    """A column of dates as (n,) float64 seconds; empty where it contains words."""
-    if column.form and column.form != "date":
-        return seconds(cells, column.form)
-    column.encode(cells)
-    return np.empty(0)
+    return TextColumn(cells.filter(words)[0], cells=[pl.repeat("", n_before, dtype=pl.String, eager=True)])
 
 
 # Dates and times of day in usual formats as seconds.
@@ -175,10 +185,3 @@ def seconds(cells: pl.Series, form: str) -> FloatArray:
         text = text.str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
     timestamps = text.str.to_datetime(form, time_unit="ns", strict=False)
     return np.asarray(timestamps.dt.timestamp("ns").cast(pl.Float64).to_numpy() / 1e9, dtype=np.float64)
-
-
-def past_midnight(time_of_day_s: FloatArray) -> FloatArray:
-    """Times of day [s] continued after midnight: a step back by more than half a day is a new day."""
-    step = np.diff(time_of_day_s, prepend=time_of_day_s[:1])
-    with np.errstate(invalid="ignore"):
-        return np.asarray(time_of_day_s + _DAY_S * np.cumsum(step < -0.5 * _DAY_S), dtype=np.float64)

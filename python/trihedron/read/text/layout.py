@@ -44,6 +44,10 @@ class Layout:
     remarks: tuple[int, ...] = ()
     """Lines (from 1) of remarks between the names and the first row."""
 
+    def name(self, column: int) -> str:
+        """Name of a column; "" without a header."""
+        return self.names[column] if self.names else ""
+
 
 def split(line: str, separator: str) -> list[str]:
     """Fields of a line, without surrounding blanks and quotes."""
