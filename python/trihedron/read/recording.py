@@ -20,7 +20,6 @@ from trihedron.read.audit.readings import audit_readings, audit_seam, audit_step
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
-from trihedron.read.column_roles import mapping_of
 from trihedron.read.columns import Sensor, Triad
 from trihedron.read.devices import Choice, by_sensor, one_beside
 from trihedron.read.errors import ReadError, errors_of_system
@@ -229,7 +228,7 @@ def _judged_gyro(
         changed = audit_seam(sensors.time_s, acc, sensors.gyroscope, clear, sensors.place)
     if clear is not None and clear.motionless:
         is_one_file = sensors.columns.gyroscope is not None
-        without_gyro = mapping_of(replace(sensors.columns, gyroscope=None)) if is_one_file else ""
+        without_gyro = replace(sensors.columns, gyroscope=None).mapping() if is_one_file else ""
         changed += audit_motionless_gyro(clear.motionless, without_gyro)
     return Judged(judged.unit, (*judged.findings, *changed), fits)
 
@@ -242,7 +241,7 @@ def _exchanged(sensors: Sensors, rate_hz: float) -> list[Finding]:
         return []
     columns = sensors.columns
     swapped = replace(columns, accelerometer=columns.gyroscope, gyroscope=columns.accelerometer)
-    mapping = "" if columns.gyroscope is None else mapping_of(swapped)
+    mapping = "" if columns.gyroscope is None else swapped.mapping()
     return [Finding.of(FindingCode.SENSORS_EXCHANGED, is_one_file=bool(mapping), mapping=mapping)]
 
 
@@ -302,7 +301,7 @@ def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
         rates = np.stack([sensors.column(column) for column in triad], axis=1)
         if not _turns_with(accelerometer, rates, rate_hz):
             continue
-        mapping = mapping_of(columns, triad)
+        mapping = replace(columns, gyroscope=triad).mapping()
         listed = " ".join(table.label(column) for column in triad)
         found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
     return tuple(found)

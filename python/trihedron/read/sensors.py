@@ -14,8 +14,7 @@ from trihedron.read.clock.base import PART, Clock, build_clock
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
-from trihedron.read.column_roles import columns_of_words, mapping_of, rivals_of, statement
-from trihedron.read.columns import Columns, Sensor, find_columns
+from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
@@ -125,7 +124,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         )
     if chosen.time is None and options.columns is None and options.rate_hz is None:
         table, chosen = summed_steps(table, chosen)
-    findings = [*table.findings, *chosen.findings, *rivals_of(table, chosen), *columns_of_words(table, chosen)]
+    findings = [*table.findings, *chosen.findings]
     if chosen.time is None:
         reject_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)
@@ -140,7 +139,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
             accelerometer, gyroscope = gyroscope, accelerometer
             chosen = replace(chosen, accelerometer=chosen.gyroscope, gyroscope=chosen.accelerometer)
         order = why if is_first is None else f"{why}-{'accelerometer' if is_first else 'gyro'}"
-        findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, f"six-{order}", mapping=mapping_of(chosen)))
+        findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, f"six-{order}", mapping=chosen.mapping()))
     findings.insert(len(table.findings), statement(table, chosen, path.name if sensor else ""))
     for name, triad in (("accelerometer", accelerometer), ("gyroscope", gyroscope)):
         if triad is not None:

@@ -14,45 +14,42 @@ from trihedron.read.clock.base import build_clock
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
+from trihedron.read.names import parse_name
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.reference import ReferenceMotion
-from trihedron.units import acceleration_to_si, rate_to_si
+from trihedron.units import RateUnit, acceleration_to_si, rate_to_si
 
 WAYS = (
     "'t,qw,qx,qy,qz', 't,r11,r12,...,r33', 't,rot_z [deg],rot_y [deg],rot_x [deg]' (in the order of the turns), "
     "'t,roll [deg],pitch [deg],yaw [deg]' or 't,wx [deg/s],wy [deg/s],wz [deg/s]', with 'px [m],py [m],pz [m]' beside "
     "an attitude"
 )
-_TIME = re.compile(r"(t|time|timestamp|stamp|secs?|seconds|epoch|time_?unix|t_?unix|unix)(_?(s|ms|us|ns))?")
-_QUATERNION = re.compile(r"(?:q|quat|quaternion|orientation|rot)?[_. ]*q?([wxyz])")
-_MATRIX = re.compile(r"(?:r|m|rot|c|dcm)_?([0-3])_?([0-3])")
-_TURN = re.compile(r"rot_([xyz])")
-_RATE = re.compile(r"(?:w|omega|rate|gyro?|angular_?(?:velocity|rate))[_. ]*([xyz])")
-_POSITION = re.compile(r"(?:p|pos|position|trans|translation)[_. ]*([xyz])")
-_AEROSPACE = ("yaw", "pitch", "roll")
-_UNITS = {
-    "deg": math.radians(1.0), "degree": math.radians(1.0), "degrees": math.radians(1.0), "°": math.radians(1.0),
-    "rad": 1.0, "m": 1.0, "mm": 1e-3, "cm": 1e-2, "rad/s": 1.0, "rads": 1.0, "rps": 1.0, "1": 1.0,
-    "deg/s": math.radians(1.0), "degs": math.radians(1.0), "dps": math.radians(1.0), "°/s": math.radians(1.0),
-    "rpm": math.pi / 30.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9,
-}  # fmt: skip
+_FORMS = {
+    "q": re.compile(r"(?:q|quat|quaternion|orientation)[_. ]*q?([wxyz])"),
+    "r": re.compile(r"(?:r|m|rot|c|dcm)_?([0-3])_?([0-3])"),
+    "rot": re.compile(r"rot_([xyz])"),
+    "rpy": re.compile(r"(yaw|pitch|roll)"),
+    "p": re.compile(r"(?:p|pos|position|trans|translation)[_. ]*([xyz])"),
+}
+"""Names of attitude and position; time and rate are named as in a log."""
+_NAMED = re.compile(r"\s*(.*?)\s*(?:[\[(]\s*(.*?)\s*[\])]|_(deg|rad|mm|m))?\s*")
+"""A name, and its unit in brackets or as a suffix."""
+_DEG = math.radians(1.0)
+_UNITS = {"deg": _DEG, "degree": _DEG, "degrees": _DEG, "°": _DEG, "rad": 1.0, "m": 1.0, "mm": 1e-3, "cm": 1e-2}
 
 
 @dataclass(frozen=True)
 class Role:
-    """A column's meaning: ``what`` (time, q, r, rot, rpy, w, p), its ``index`` (wxyz, row and column, axis), unit."""
+    """A column's meaning: ``what`` (time, q, r, rot, rpy, w, p), its ``index`` (wxyz, row and column, axis), the factor
+    to SI of its unit (None where it is not stated), and the unit of a time."""
 
     column: int
     what: str
     index: str
-    unit: str
-
-    @property
-    def to_si(self) -> float:
-        """Factor to SI; 1 where the name states no unit."""
-        return _UNITS.get(self.unit, 1.0)
+    to_si: float | None = None
+    time_unit: str = ""
 
 
 def roles_of(table: Table, said: str | None) -> list[Role]:
@@ -61,57 +58,35 @@ def roles_of(table: Table, said: str | None) -> list[Role]:
     Raises ``ReadError`` when the columns have neither names nor a statement of the user, or the statement does not fit
     the file.
     """
-    if said is None:
-        if table.names is None:
-            raise ReadError(
-                f"{table.path}: the columns of this reference have no names; name them in file order with "
-                f"--reference-columns: {WAYS}."
-            )
-        names = list(table.names)
-    else:
-        names = [word.strip() for word in said.split(",")]
-        if len(names) > len(table.columns):
-            raise ReadError(
-                f"{table.path}: --reference-columns names {len(names)} columns and the file has {len(table.columns)}."
-            )
-    roles = [role for column, name in enumerate(names) if (role := _role(column, name)) is not None]
-    if said is not None:
-        known = {role.column for role in roles}
-        odd = [name for column, name in enumerate(names) if name not in ("", "-", "_") and column not in known]
-        if odd:
-            raise ReadError(
-                f"{table.path}: --reference-columns does not know {odd[0]!r}; write {WAYS}, '-' for others."
-            )
-    return roles
+    if said is None and table.names is None:
+        raise ReadError(
+            f"{table.path}: the columns of this reference have no names; name them in file order with "
+            f"--reference-columns: {WAYS}."
+        )
+    names = list(table.names or ()) if said is None else [word.strip() for word in said.split(",")]
+    if len(names) > len(table.columns):
+        raise ReadError(
+            f"{table.path}: --reference-columns names {len(names)} columns and the file has {len(table.columns)}."
+        )
+    roles = [_role(column, name) for column, name in enumerate(names)]
+    odd = [name for name, role in zip(names, roles, strict=True) if role is None and name not in ("", "-", "_")]
+    if odd and said is not None:
+        raise ReadError(f"{table.path}: --reference-columns does not know {odd[0]!r}; write {WAYS}, '-' for others.")
+    return [role for role in roles if role is not None]
 
 
 def _role(column: int, name: str) -> Role | None:
-    bare, unit = _split(name)
-    if _TIME.fullmatch(bare):
-        suffix = bare.rsplit("_", 1)[-1] if "_" in bare else ""
-        return Role(column, "time", "", unit or (suffix if suffix in ("s", "ms", "us", "ns") else ""))
-    if bare in _AEROSPACE:
-        return Role(column, "rpy", bare, unit)
-    if match := _TURN.fullmatch(bare):
-        return Role(column, "rot", match[1], unit)
-    for what, form in (("q", _QUATERNION), ("r", _MATRIX), ("w", _RATE), ("p", _POSITION)):
-        if what == "q" and not (bare.startswith(("q", "quat", "orientation"))):
-            continue
-        if match := form.fullmatch(bare):
-            return Role(column, what, "".join(match.groups()), unit)
+    bare, bracket, suffix = _NAMED.fullmatch(name.lower()).groups()  # type: ignore[union-attr]
+    for what, form in _FORMS.items():
+        if match := form.fullmatch(bare.replace(" ", "_")):
+            return Role(column, what, "".join(match.groups()), _UNITS.get(bracket or suffix))
+    meaning = parse_name(name)
+    if meaning.role == "time":
+        return Role(column, "time", "", time_unit=meaning.time_unit)
+    if meaning.role == "gyroscope":
+        units = {unit.value: rate_to_si(unit) for unit in RateUnit}
+        return Role(column, "w", meaning.axis, units.get(meaning.unit))
     return None
-
-
-def _split(name: str) -> tuple[str, str]:
-    """Name in lower case and its unit, written ``[deg]``, ``(deg)`` or as the suffix ``_deg``."""
-    word = name.strip().lower()
-    if match := re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", word):
-        return match[1].strip().replace(" ", "_"), match[2].replace("^-1", "").replace("s⁻¹", "/s")
-    for suffix, unit in (("_deg_s", "deg/s"), ("_dps", "deg/s"), ("_rad_s", "rad/s"), ("_deg", "deg"), ("_rad", "rad"),
-                         ("_mm", "mm"), ("_m", "m")):  # fmt: skip
-        if word.endswith(suffix):
-            return word.removesuffix(suffix), unit
-    return word.replace(" ", "_"), ""
 
 
 LONG_ROW_S = 0.5
@@ -135,21 +110,26 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
     times = [role for role in roles if role.what == "time"]
     if not times:
         raise ReadError(f"{table.path}: no column of this reference is its time; name it t, or say {WAYS}.")
-    clock = build_clock(table, times[0].column, times[0].unit, None)
-    rows = np.arange(len(table.columns[times[0].column])) if clock.rows is None else clock.rows
+    clock = build_clock(table, times[0].column, times[0].time_unit, None)
+    rows = np.arange(len(clock.time_s)) if clock.rows is None else clock.rows
     used = [role for role in roles if role.what != "time"]
-    whole = np.all([np.isfinite(table.columns[role.column][rows]) for role in used], axis=0) if used else None
-    if whole is None or whole.sum() < 2:
-        raise ReadError(f"{table.path}: this reference has neither attitude nor rate: its columns are {WAYS}.")
-    if not np.all(whole):
-        rows = rows[whole]
-    time_s = clock.time_s[whole]
-    attitude = attitude_of(table, used, rows)
-    rate = None if attitude is not None else _triad(table, used, "w", rows, "rate")
-    position = None if attitude is None else _triad(table, used, "p", rows, "position")
+    whole = np.all([np.isfinite(table.columns[role.column][rows]) for role in used], axis=0)
+    rows = rows[whole] if used and whole.sum() >= 2 else rows[:0]
+    attitude = attitude_of(table, used, rows) if len(rows) else None
+    rate = _triad(table, used, "w", rows) if attitude is None and len(rows) else None
     if attitude is None and rate is None:
         raise ReadError(f"{table.path}: this reference has neither attitude nor rate: its columns are {WAYS}.")
-    return _settled(table, time_s, clock.start_s, attitude, rate, position, (*table.findings, *clock.findings))
+    position = None if attitude is None else _triad(table, used, "p", rows)
+    motion = ReferenceMotion(
+        clock.time_s[whole],
+        attitude=attitude,
+        rate=rate,
+        position=position,
+        start_epoch_s=clock.start_s,
+        source=str(table.path),
+        sha256=table.sha256,
+    )
+    return _settled(motion, (*table.findings, *clock.findings))
 
 
 def of_recording(recording: Recording) -> ReferenceMotion:
@@ -180,47 +160,45 @@ def of_recording(recording: Recording) -> ReferenceMotion:
     )
 
 
-def _triad(table: Table, roles: list[Role], what: str, rows: IntArray, name: str) -> FloatArray | None:
+def _triad(table: Table, roles: list[Role], what: str, rows: IntArray) -> FloatArray | None:
     part = {role.index: role for role in roles if role.what == what}
     if not part:
         return None
     if set(part) != set("xyz"):
+        name = "rate" if what == "w" else "position"
         raise ReadError(f"{table.path}: the reference's {name} needs columns of X, Y and Z; found {', '.join(part)}.")
-    if what == "w" and any(not role.unit for role in part.values()):
+    if what == "w" and any(role.to_si is None for role in part.values()):
         raise ReadError(
             f"{table.path}: the unit of the reference's rate is not stated; name its columns 'wx [deg/s]' or "
             "'wx [rad/s]', in the file or with --reference-columns."
         )
-    return np.column_stack([part[axis].to_si * table.columns[part[axis].column][rows] for axis in "xyz"])
+    return np.column_stack([(part[axis].to_si or 1.0) * table.columns[part[axis].column][rows] for axis in "xyz"])
 
 
-def _settled(
-    table: Table, time_s: FloatArray, start_s: float, attitude: FloatArray | None, rate: FloatArray | None,
-    position: FloatArray | None, findings: tuple[Finding, ...],
-) -> ReferenceMotion:  # fmt: skip
+def _settled(motion: ReferenceMotion, findings: tuple[Finding, ...]) -> ReferenceMotion:
     """The reference on an even clock if its timestamps have one, without rows that share an arrival."""
+    time_s, start_s, rate, attitude = motion.time_s, motion.start_epoch_s, motion.rate, motion.attitude
     stepwise = rate is not None and float(np.median(np.diff(time_s))) > LONG_ROW_S
-    if not stepwise:
+    if stepwise:
+        findings = (*findings, Finding.of(FindingCode.COLUMNS_ASSUMED, "commands", n_rows=len(time_s)))
+    else:
         # Rows of the attitude matrix change with motion as readings do: two of them show when a row was taken.
-        triads = [rate] if rate is not None else [attitude[:, 0], attitude[:, 1]]  # type: ignore[index]
-        settled = settle_clock(time_s, start_s, [np.ascontiguousarray(t) for t in triads if t is not None])
+        triads = [] if attitude is None else [attitude[:, 0], attitude[:, 1]]
+        triads = triads if rate is None else [rate]
+        settled = settle_clock(time_s, start_s, [np.ascontiguousarray(t) for t in triads])
         time_s, start_s = settled.time_s, settled.start_s
         findings = (*findings, *settled.findings)
     keep = np.concatenate([[True], np.diff(time_s) > SHORTEST_STEP * float(np.median(np.diff(time_s)))])
-    if stepwise:
-        findings = (*findings, Finding.of(FindingCode.COLUMNS_ASSUMED, "commands", n_rows=len(time_s)))
-    motion = ReferenceMotion(
-        time_s[keep],
+    return replace(
+        motion,
+        time_s=time_s[keep],
         attitude=None if attitude is None else attitude[keep],
         rate=None if rate is None else rate[keep],
-        position=None if position is None else position[keep],
+        position=None if motion.position is None else motion.position[keep],
         is_stepwise=stepwise,
         start_epoch_s=start_s,
-        source=str(table.path),
-        sha256=table.sha256,
+        findings=tuple(replace(f, seen=f"Reference: {f.seen[0].lower()}{f.seen[1:]}") for f in findings),
     )
-    said = tuple(replace(f, seen=f"Reference: {f.seen[0].lower()}{f.seen[1:]}") for f in findings)
-    return replace(motion, findings=said)
 
 
 # Columns of attitude as rotation matrices, body → world; numbers that are not a rotation are rejected.
@@ -301,13 +279,12 @@ def _angles(table: Table, turns: list[Role], named: list[Role], rows: IntArray) 
             raise ReadError(f"{table.path}: roll, pitch and yaw are wanted all three; or write {WAYS}.")
         parts, order = [by["yaw"], by["pitch"], by["roll"]], "ZYX"
     angles = np.column_stack([table.columns[role.column][rows] for role in parts])
-    if any(not role.unit for role in parts):
+    factors = [role.to_si for role in parts]
+    if None in factors:
         if float(np.nanmax(np.abs(angles))) <= 2.0 * np.pi:
             raise ReadError(
                 f"{table.path}: the unit of the angles is not stated, and rad and deg are both possible; name them "
                 "'roll [deg]' or 'roll [rad]', in the file or with --reference-columns."
             )
-        angles = np.radians(angles)
-    else:
-        angles = angles * np.array([role.to_si for role in parts])
-    return np.asarray(Rotation.from_euler(order, angles).as_matrix(), dtype=np.float64)
+        factors = [_DEG] * 3
+    return np.asarray(Rotation.from_euler(order, angles * np.array(factors)).as_matrix(), dtype=np.float64)
