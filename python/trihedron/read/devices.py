@@ -36,9 +36,8 @@ def one_beside(table: Table, instance: str | None) -> Table:
         others = {i for columns in devices.values() for i in columns}
         listed = phrase("devices", devices=[(name, table.n_rows) for name in sorted([instance, *devices])])
         return replace(
-            table,
+            table.without(others),
             names=tuple(own.get(i, name) for i, name in enumerate(table.names or ())),
-            columns=tuple(np.empty(0) if i in others else column for i, column in enumerate(table.columns)),
             findings=(*table.findings, chosen(phrase("names"), instance, listed, 0)),
             is_chosen=True,
         )
@@ -75,11 +74,9 @@ MAX_DEVICES = 16
 MAX_ROWS = 50_000
 LONGEST_BURST = 256
 """Largest displacement of rows against time order where several devices write in bursts."""
-_DEVICE_NAMES = frozenset(
-    {"i", "addr", "src", "ch", "channel", "port", "bus", "slot", "dev", "instance", "imu", "imuid", "imunr"}
-    | {"imunumber", "id", "device", "deviceid", "devicename", "devicenr", "sensor", "sensorid", "sensorname", "unit"}
-    | {"unitid", "node", "nodeid", "mac", "macaddress", "address", "source", "topic", "topicname", "frameid"}
-    | {"headerframeid"}
+_DEVICE_NAMES = re.compile(
+    "i|addr|src|ch|channel|port|bus|slot|dev|instance|(imu|device|sensor|unit|node)(id|nr|number|name)?|id|mac|source|"
+    "(mac)?address|topic(name)?|(header)?frameid"
 )
 _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magnetometer", "t": "temperature"}
 """Sensors of records named by a letter, used only where all records are: letters may also name devices A, B, ..."""
@@ -111,29 +108,34 @@ def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
 
     Raises ``ReadError`` when there are several devices and none is chosen, or the chosen one does not exist.
     """
-    used, time = chosen_columns.used(), chosen_columns.time
-    column, words, codes = _device_column(table, used, chosen_columns.device)
+    time, others = chosen_columns.time, [i for i in range(len(table.columns)) if i not in chosen_columns.used()]
+    named = others if chosen_columns.device is None else [chosen_columns.device]
+    named = [i for i in named if i == chosen_columns.device or _DEVICE_NAMES.fullmatch(_plain(table, i))]
     order = _in_time(table, time, MAX_ROWS)
     readings = [table.columns[i][order] for i in chosen_columns.readings if len(table.columns[i])]
-    if column < 0 and readings and (n := n_interleaved(np.stack(readings, axis=1))) > 1:
-        column, words, codes = _device_column(
-            table, used, None, lambda codes: bool(np.mean(np.diff(codes[order]) != 0) > 0.5)
-        )
-        if column < 0 and choice.instance is None:
+    found = _device_column(table, named, lambda _: True)
+    if found is None and readings and (n := n_interleaved(np.stack(readings, axis=1))) > 1:
+        found = _device_column(table, others, lambda codes: bool(np.mean(np.diff(codes[order]) != 0) > 0.5))
+        if found is None and choice.instance is None:
             return replace(table, findings=(*table.findings, Finding.of(FindingCode.DEVICES_INTERLEAVED, n=n)))
-        if column < 0:
+        if found is None:
             return _by_turn(table, choice.instance or "", n, time)
-    if column < 0 and time is not None:
-        column, words, codes = _device_column(table, used, None, _changes_with(table, time))
-    if column < 0:
-        if choice.instance is not None:
-            raise ReadError(
-                f"{table.path}: instance {choice.instance} was given, but no column identifies devices; leave "
-                "--instance out."
-            )
+    if found is None and time is not None and (back := _steps_back(table, time)) is not None:
+        # A column that changes where the clock goes back and almost nowhere else.
+        found = _device_column(
+            table,
+            others,
+            lambda codes: bool(np.diff(codes)[back].all() and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1),
+        )
+    if found is None and choice.instance is not None:
+        raise ReadError(
+            f"{table.path}: instance {choice.instance} was given, but no column identifies devices; leave "
+            "--instance out."
+        )
+    if found is None:
         return table
-    counts = np.bincount(codes, minlength=len(words))
-    listed = phrase("devices", devices=list(zip(words, counts, strict=True)))
+    column, words, codes = found
+    listed = phrase("devices", devices=list(zip(words, np.bincount(codes, minlength=len(words)), strict=True)))
     if choice.instance is None:
         raise ReadError(
             f"{table.path}: column {table.label(column)} identifies {len(words)} devices: {listed}; read one of them "
@@ -144,9 +146,8 @@ def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
             f"{table.path}: there is no instance {choice.instance}; column {table.label(column)} has {listed}."
         )
     rows = np.flatnonzero(codes == words.index(choice.instance)).astype(np.int64)
-    left = table.n_rows - len(rows)
-    where = phrase("column", column=table.label(column))
-    return table.take(rows, table.n_in_file, chosen(where, choice.instance, listed, left))
+    note = chosen(phrase("column", column=table.label(column)), choice.instance, listed, table.n_rows - len(rows))
+    return table.take(rows, table.n_in_file, note)
 
 
 def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Finding:
@@ -160,13 +161,17 @@ def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Findin
     )
 
 
-def _changes_with(table: Table, time: int) -> Callable[[IntArray], bool]:
-    """A test whether codes (n,) change where the clock goes back and almost nowhere else; False if the clock wraps."""
+def _plain(table: Table, column: int) -> str:
+    """Letters and digits of a column's name, without its unit."""
+    name = table.names[column] if table.names is not None else ""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", name.lower()))
+
+
+def _steps_back(table: Table, time: int) -> IntArray | None:
+    """Rows (k,) after which the clock goes back; None without such rows, or where it wraps."""
     raw = table.columns[time]
     back = np.flatnonzero(np.diff(raw) < 0.0)
-    if not len(back) or unwrap(raw, table, None, [])[1]:
-        return lambda _: False
-    return lambda codes: bool(np.diff(codes)[back].all() and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1)
+    return back if len(back) and not unwrap(raw, table, None, [])[1] else None
 
 
 def _in_time(table: Table, time: int | None, most: int) -> IntArray:
@@ -198,23 +203,18 @@ def _by_turn(table: Table, instance: str, n: int, time: int | None) -> Table:
 
 
 def _device_column(
-    table: Table, used: set[int], only: int | None = None, fits: Callable[[IntArray], bool] | None = None
-) -> tuple[int, list[str], IntArray]:
-    """Column, words and codes (n,) of the device column: ``only``, or the first whose codes pass ``fits``, or the
-    first whose name means device."""
-    for i in range(len(table.columns)) if only is None else (only,):
-        name = table.names[i] if table.names is not None else ""
-        plain = re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", name.lower()))
-        if only is None and (i in used or (fits is None and plain not in _DEVICE_NAMES)):
-            continue
+    table: Table, columns: list[int], fits: Callable[[IntArray], bool]
+) -> tuple[int, list[str], IntArray] | None:
+    """Column, words and codes (n,) of the first column with a few words or whole numbers whose codes pass ``fits``."""
+    for i in columns:
         words, values = table.labels.get(i, ((), table.columns[i]))
         if not len(values) or not np.all(values == np.rint(values)) or len(np.unique(values[: 1 << 16])) > MAX_DEVICES:
             continue
         different, codes = np.unique(values, return_inverse=True)
-        if 2 <= len(different) <= MAX_DEVICES and np.isfinite(different).all() and (fits is None or fits(codes)):
+        if 2 <= len(different) <= MAX_DEVICES and np.isfinite(different).all() and fits(codes):
             names = [words[int(k)] for k in different] if words else [f"{value:.0f}" for value in different]
             return i, names, codes.astype(np.int64)
-    return -1, [], np.zeros(0, dtype=np.int64)
+    return None
 
 
 def by_sensor(table: Table) -> tuple[Table, ...]:

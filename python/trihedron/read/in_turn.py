@@ -1,7 +1,5 @@
 """Splits a table whose rows contain either the accelerometer or the gyro, with the other's cells empty, into two."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from trihedron.arrays import BoolArray, IntArray
@@ -51,16 +49,15 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
         gyroscope_rows=len(rows[1]),
         rows_left_out=left,
     )
-    first, second = _without_counter(table, chosen.counter).by_sensor(rows[0], rows[1], left, note)
+    if chosen.counter is not None and np.median(np.diff(table.columns[chosen.counter])) == 1.0:
+        # By a counter of all rows those of the other sensor would count as lost.
+        table = table.without({chosen.counter})
+    first, second = table.by_sensor(rows[0], rows[1], left, note)
     return _filled(first), _filled(second)
 
 
 def _has_reading(table: Table, triad: Triad, most: int | None) -> BoolArray:
-    has = np.zeros(len(table.columns[triad[0]][:most]), dtype=np.bool_)
-    for column in triad:
-        if len(table.columns[column][:most]) == len(has):
-            has |= np.isfinite(table.columns[column][:most])
-    return has
+    return np.any([np.isfinite(table.columns[i][:most]) for i in triad if len(table.columns[i])], axis=0)
 
 
 def _is_every_other(rows: IntArray) -> bool:
@@ -69,15 +66,6 @@ def _is_every_other(rows: IntArray) -> bool:
     return usual > 1 and bool(np.mean(step == usual) >= _IN_STEP)
 
 
-def _without_counter(table: Table, counter: int | None) -> Table:
-    """The table without a counter of all rows, by which the other sensor's rows would count as lost."""
-    if counter is None or not len(table.columns[counter]) or np.median(np.diff(table.columns[counter])) != 1.0:
-        return table
-    columns = tuple(np.empty(0) if i == counter else column for i, column in enumerate(table.columns))
-    return replace(table, columns=columns, rows_in_file=table.n_in_file)
-
-
 def _filled(table: Table) -> Table:
     """The table without the columns that are empty in these rows."""
-    columns = tuple(c if len(c) and np.isfinite(c).any() else np.empty(0) for c in table.columns)
-    return replace(table, columns=columns)
+    return table.without({i for i, c in enumerate(table.columns) if not (len(c) and np.isfinite(c).any())})

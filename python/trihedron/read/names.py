@@ -21,19 +21,40 @@ _SENSOR_WORDS = {
     ),
 }
 _LETTER = {"a": "accelerometer", "f": "accelerometer", "g": "gyroscope", "w": "gyroscope", "t": "translation"}
-_GLUED = re.compile(
-    r"^(acc|accel|accelero?|accelerometer|acceleration|gyr|gyro|gyroscope|omega|linacc|[agwft])_?([xyz])(raw|adc|out)?$"
+_DEVICE_WORDS = r"(?:imu|dev|device|sensor|node|unit|port|ch|mpu|bmi|icm|lsm)\d*"
+_DEVICE_WORD = re.compile(f"{_DEVICE_WORDS}$")
+_GLUED = tuple(
+    (re.compile(pattern), by)
+    for pattern, by in (
+        (
+            r"\b(accelero?(?:meter)?|acceleration|acc|gyro?|gyroscope|omega|linacc)([xyz])(raw|adc)?(?:out)?\b",
+            r"\1 \2 \3",
+        ),
+        (rf"^((?:{_DEVICE_WORDS} )*[agwft])([xyz])(raw|adc)?(?:out)?\b", r"\1 \2 \3"),
+        # Axis before the sensor, as MAVLink writes it: xacc, ygyro.
+        (r"\b([xyz])(acc|accel|accelerometer|acceleration|gyro?|gyroscope|rate)\b", r"\2 \1"),
+        (r"^(?!.*\b[xyz]\b)(.*\b(?:acc|accel|gyro?|omega))([0-3])\b", r"\1 \2"),
+        (r"\b([xyz])out\b", r"\1"),
+    )
 )
-_AXIS_FIRST = re.compile(r"^([xyz])(acc|accel|accelerometer|acceleration|gyr|gyro|gyroscope|rate)$")
-"""Axis before the sensor, as MAVLink writes it: xacc, ygyro."""
-_NUMBERED = re.compile(r"^(acc|accel|gyr|gyro|omega)([0123])$")
-_DEVICE_WORD = re.compile(r"(imu|dev|device|sensor|node|unit|port|ch|mpu|bmi|icm|lsm)\d*$")
+"""Words in which a sensor and an axis are joined, and the same words apart; the first that fits is replaced."""
+_SPELLINGS = (
+    (r"m/\((?:s|sec)\^2\)", "m/s^2"),
+    (r"^gF([xyz])$", r"raw specific \1 [g]"),  # Physics Toolbox: force in g along an axis; the g does not mean gyro
+    (r"^N(?=[xyz](?![A-Za-z]))", "acc "),  # load factors in aeronautics, logged with p q r
+    (r"^Ac(?=[XYZ](?![A-Za-z]))", "acc"),  # the common Arduino sketch for MPU-6050 boards: AcX, GyX
+    (r"^Gy(?=[XYZ](?![A-Za-z]))", "gyr"),
+    (r"([XYZ])(Mps2|RadPerSec|MicroT)\b", r" \1 \2"),  # GnssLogger: UncalAccelXMps2, UncalGyroZRadPerSec
+    # The size of a tick behind a name: ticks_25 us, ticks_1/32768 s; a unit behind "in" or "/".
+    (r"(?i)(?:\s+in\s+|[\s_/]+)((?:1/)?\d[\d.]*\s*(?:k?hz|[mnuµ]?s))$", r" [\1]"),
+    (r"\s+(?:in|/)\s+([^\s\])]+)$", r" [\1]"),
+    # An index, also before a unit: gyro[0] [rad/s].
+    (r"[\[({]\s*([012xyzXYZ])\s*[\])}]\s*([\[({][^\])}]*[\])}]\s*)?$", r" \1 \2"),
+)
 _LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$|^(micro|nano|kilo|mega)")
 """Text in a bracket that is a unit, known or not; for an unknown unit the user is asked."""
 _UNIT_BEHIND = re.compile(r"[xyz][ _]([a-zµ°]+/[a-z]+[0-9²]?)$")
 """A unit after the axis: gyro_x_rev/s."""
-_TICK_BEHIND = re.compile(r"(?:\s+in\s+|[\s_/]+)((?:1/)?\d[\d.]*\s*(?:k?hz|[mnuµ]?s))$", re.IGNORECASE)
-"""The size of a tick after a name: ticks_25 us, ticks_1/32768 s."""
 _OTHER_TIMES = frozenset({"min", "minute", "h", "hr", "hour"})
 """Words after which a unit is not one per second: rad/min begins as rad does."""
 _OF_READINGS = frozenset(
@@ -177,40 +198,16 @@ def is_rate(text: str) -> bool:
 @lru_cache(maxsize=4096)
 def parse_name(name: str) -> ColumnName:
     """The meaning of a column called ``name``."""
-    text = plain(name.strip().strip('"').strip()).replace("m/(s^2)", "m/s^2").replace("m/(sec^2)", "m/s^2")
-    if re.fullmatch(r"gF[xyz]", text):
-        # Physics Toolbox: force in g along an axis; the g does not mean gyro.
-        return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)
-    # Load factors in aeronautics, logged with p q r.
-    text = re.sub(r"^N(?=[xyz](?![A-Za-z]))", "acc ", text)
-    # The common Arduino sketch for MPU-6050 boards: AcX, GyX.
-    text = re.sub(r"^(Ac|Gy)(?=[XYZ](?![A-Za-z]))", lambda m: {"Ac": "acc", "Gy": "gyr"}[m[1]], text)
-    # GnssLogger joins axis and unit: UncalAccelXMps2, UncalGyroZRadPerSec.
-    text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
-    bracket = ""
-    index = ""
-    text = re.sub(r"\s+(?:in|/)\s+([^\s\])]+)$", r" [\1]", _TICK_BEHIND.sub(r" [\1]", text))
-    found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", text)
-    if found:
-        inside = found.group(1)
-        text_before = text[: found.start()]
-        if re.fullmatch(r"[012]", inside):
-            index = inside
-        elif re.fullmatch(r"[xyzXYZ]", inside):
-            index = inside.lower()
-        else:
-            bracket = inside.lower()
-        text = text_before
-    # Another index before a unit in brackets, as in "gyro[0] [rad/s]".
-    inner = re.search(r"[\[(]\s*([012xyzXYZ])\s*[\])]\s*$", text)
-    if inner:
-        index, text = inner.group(1).lower(), text[: inner.start()]
+    text = plain(name.strip().strip('"').strip())
+    for pattern, by in _SPELLINGS:
+        text = re.sub(pattern, by, text)
+    text = text.rstrip()
+    found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]$", text)
+    bracket, text = (found[1].lower(), text[: found.start()]) if found else ("", text)
     text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
-    words = english(_WORD.findall(_CAMEL.sub(r"\1 \2", text).lower()))
     # The LSB or a range is not a unit of the readings.
     stated = "" if re.match(r"[±+x*×-]*\s*\d[\d.]*(\s*/\s*[\d.]+)?\s*[a-zµ°]", bracket) else bracket
-    unit_words = _of_unit(stated)
-    said = _classify(words, unit_words, index)
+    said = _classify(english(_WORD.findall(_CAMEL.sub(r"\1 \2", text).lower())), _of_unit(stated))
     behind = _UNIT_BEHIND.search(text.lower())
     unknown = stated if _LOOKS_LIKE_A_UNIT.search(stated) else behind[1] if behind else ""
     if said.role in _SENSOR_WORDS and not said.unit and unknown:
@@ -220,63 +217,34 @@ def parse_name(name: str) -> ColumnName:
     return said
 
 
-def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName:
+def _classify(words: list[str], unit_words: list[str]) -> ColumnName:
     if not words:
         return ColumnName()
-    glued_axis = ""
-    expanded: list[str] = []
-    for i, word in enumerate(words):
-        word = {"xout": "x", "yout": "y", "zout": "z"}.get(word, word)
-        match = _GLUED.match(word)
-        turned, numbered = _AXIS_FIRST.match(word), _NUMBERED.match(word)
-        is_first = words[0] == word or all(_DEVICE_WORD.match(other) for other in words[:i])
-        if turned and not glued_axis:
-            glued_axis = turned.group(1)
-            expanded.append(turned.group(2))
-        elif numbered and not index and not any(other in ("x", "y", "z") for other in words):
-            index = numbered.group(2)
-            expanded.append(numbered.group(1))
-        elif match and not glued_axis and not (len(match.group(1)) == 1 and len(words) > 1 and not is_first):
-            glued_axis = match.group(2)
-            expanded.append(match.group(1))
-            if match.group(3) in {"adc", "raw"}:
-                expanded.append("adc" if match.group(3) == "adc" else "raw")
-        else:
-            expanded.append(word)
     single = _single_role(words, unit_words)
     if single is not None:
         return single
-    axis = index or glued_axis
-    rest = expanded
     if words[0] in _RATES and (len(words) == 1 or _unit("gyroscope", words[1:])):
         unit = _unit("gyroscope", unit_words) or _unit("gyroscope", words[1:])
-        return ColumnName("gyroscope", _RATES[words[0]], "p q r", unit, rank=-1, words=tuple(unit_words))
-    if len(rest) > 1 and "axis" in rest:
-        rest.remove("axis")
-    if not axis:
-        for label in ("x", "y", "z", "0", "1", "2", "3"):
-            if label in rest:
-                at = len(rest) - 1 - rest[::-1].index(label)
-                axis = rest.pop(at)
-                break
+        return ColumnName("gyroscope", _RATES[words[0]], "p q r", unit, rank=-1)
+    text = " ".join(words)
+    apart = (found for pattern, by in _GLUED if (found := pattern.sub(by, text, count=1)) != text)
+    rest = [word for word in next(apart, text).split() if word != "axis" or len(words) == 1]
+    axes = [at for labels in ("xyz", "0123") for at, word in enumerate(rest) if word in labels]
+    at = max((at for at in axes if rest[at] in "xyz"), default=max(axes, default=None))
+    axis = "" if at is None else rest.pop(at)
     if not axis or any(word in _NOT_A_SENSOR for word in rest):
-        return ColumnName(words=tuple(words))
+        return ColumnName()
     sensor = _sensor(rest)
     left = [w for w in rest if not any(p.fullmatch(w) for p in _SENSOR_WORDS.values())]
-    if sensor and left and left[0] in _LETTER:
-        left = left[1:] if _LETTER[left[0]] == sensor and len(rest) == len(left) else left
+    if sensor and left and len(rest) == len(left) and _LETTER.get(left[0]) == sensor:
+        left = left[1:]
     key = " ".join(rest) + "|" + " ".join(unit_words)
     if not sensor:
-        if not rest or (len(rest) <= 2 and not _unit_words_only(rest)):
-            return ColumnName("bare" if not rest else "", axis, key, words=tuple(unit_words))
-        return ColumnName("bare", axis, key, words=tuple(rest + unit_words)) if _unit_words_only(rest) else ColumnName()
+        is_unit = bool(rest) and any("".join(rest) in table for table in _UNIT_OF.values())
+        return ColumnName("bare" if is_unit or not rest else "", axis, key, words=tuple(rest + unit_words))
     unit = _unit(sensor, unit_words) or _unit(sensor, left) if sensor in _UNIT_OF else ""
     rank = sum(points for known, points in _RANKS if not known.isdisjoint(rest))
-    return ColumnName(sensor, axis, key, unit, rank=rank, words=tuple(left + unit_words))
-
-
-def _unit_words_only(words: list[str]) -> bool:
-    return bool(words) and any("".join(words) in table for table in _UNIT_OF.values())
+    return ColumnName(sensor, axis, key, unit, rank=rank)
 
 
 def _sensor(words: list[str]) -> str:

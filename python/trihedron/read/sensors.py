@@ -144,12 +144,14 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     for name, triad in (("accelerometer", accelerometer), ("gyroscope", gyroscope)):
         if triad is not None:
             _reject_constant(table, name, triad, getattr(chosen, name))
+    kept = {chosen.temperature, chosen.supply, chosen.counter}
     return Sensors(
         clock.time_s,
         clock.start_s,
         accelerometer,
         gyroscope,
-        _without_used(table, chosen),
+        # Without the columns that were copied to the time base, to save memory for a long log.
+        table.without({c for c in (chosen.time, *chosen.readings) if c not in kept and c is not None}),
         chosen,
         clock.rows,
         0,
@@ -158,14 +160,6 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         rows_in_file=table.n_in_file,
         rows_read=len(clock.time_s),
     )
-
-
-def _without_used(table: Table, chosen: Columns) -> Table:
-    """The table without the columns that were copied to the time base, to save memory for a long log."""
-    kept = {chosen.temperature, chosen.supply, chosen.counter}
-    done = {chosen.time, *chosen.readings} - kept
-    columns = tuple(np.empty(0) if i in done else column for i, column in enumerate(table.columns))
-    return replace(table, columns=columns, rows_in_file=table.n_in_file)
 
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records import Finding, Onboard
 from trihedron.records.words import Words, words
@@ -74,6 +76,11 @@ class Table:
             findings=(*self.findings, *findings),
             rows_in_file=n_in_file,
         )
+
+    def without(self, columns: set[int]) -> Table:
+        """The table without the numbers of some columns, which keep their place."""
+        kept = tuple(np.empty(0) if i in columns else column for i, column in enumerate(self.columns))
+        return replace(self, columns=kept, rows_in_file=self.n_in_file)
 
     def by_sensor(
         self, accelerometer: IntArray, gyroscope: IntArray, n_left_out: int, note: Finding
