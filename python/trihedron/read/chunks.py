@@ -108,9 +108,9 @@ def _layout_of(log: Path) -> Layout:
     head = first_bytes(log, HEAD_BYTES)
     if b"\0" in head:
         raise ReadError(f"{log}: {ways}")
-    text = head.decode("utf-8-sig", errors="replace")
+    text = head.decode("utf-8-sig", errors="replace").replace("\r", "")
     layout = detect(text if len(head) < HEAD_BYTES else text[: text.rfind("\n") + 1])
-    if layout is None or layout.separator in (" ", "\0"):
+    if layout is None or layout.separator == " ":
         raise ReadError(f"{log}: {ways} A table's separator is a comma, a semicolon or a tab.")
     if layout.stray or layout.remarks:
         raise ReadError(

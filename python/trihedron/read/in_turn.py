@@ -57,7 +57,8 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
 
 
 def _has_reading(table: Table, triad: Triad, most: int | None) -> BoolArray:
-    return np.any([np.isfinite(table.columns[i][:most]) for i in triad if len(table.columns[i])], axis=0)
+    cells = [np.isfinite(table.columns[i][:most]) for i in triad if len(table.columns[i])]
+    return np.asarray(np.any(cells, axis=0), dtype=np.bool_)
 
 
 def _is_every_other(rows: IntArray) -> bool:

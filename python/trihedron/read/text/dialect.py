@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import IntArray
+from trihedron.read.columns import SENSORS
 from trihedron.read.devices import pick_kind
 from trihedron.read.text.layout import COMMENT_STARTS, is_number, split
 
@@ -58,45 +59,33 @@ class Rewritten:
         return cls(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))
 
 
-def lines_of(text: str) -> list[str]:
-    """The lines of a text with any line ends."""
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-
-
 def rewrite(text: str) -> Rewritten | None:
     """The text as a table; None where it has no known dialect."""
-    lines = lines_of(text)
+    lines = text.split("\n")
     prefix = _prefix_of(lines)
-    timestamps: list[str] | None = None
-    name = "arrival time"
-    rests = lines
-    if prefix is not None:
-        found = [prefix.match(line) for line in lines]
-        timestamps = [m.group(1) if m else "" for m in found]
-        unit = next((m["unit"] for m in found if m and "unit" in m.re.groupindex), "")
-        name = f"time [{unit}]" if unit else name
-        rests = [line[m.end() :] if m else line for line, m in zip(lines, found, strict=True)]
+    found = [None if prefix is None else prefix.match(line) for line in lines]
+    timestamps = [m.group(1) if m else "" for m in found]
+    unit = next((m["unit"] for m in found if m and "unit" in m.re.groupindex), "")
+    name = f"time [{unit}]" if unit else "arrival time"
+    rests = [line[m.end() :] if m else line for line, m in zip(lines, found, strict=True)]
     labelled = _labelled(rests)
     if labelled is not None:
         preamble, names, rows, numbers = labelled
-        if timestamps is not None:
+        if prefix is not None:
             names = [name, *names]
             rows = [
                 f"{timestamps[i - 1]},{row}" if timestamps[i - 1] else row for i, row in zip(numbers, rows, strict=True)
             ]
         first = [numbers[0]] * (len(preamble) + 1)
         return Rewritten.of([*preamble, ",".join(names), *rows], [*first, *numbers])
-    if timestamps is None:
+    if prefix is None:
         return None
     filled = [rest for rest in rests if re.match(rf"\s*{_NUMBER}\s*[,;\t ]", rest)]
     glue = next((s for s in (",", ";", "\t") if filled and s in filled[-1]), " ")
     rows = []
     for timestamp, rest in zip(timestamps, rests, strict=True):
-        if timestamp and rest.strip():
-            is_row = re.match(r"\s*[-+.\d]", rest) is not None
-            rows.append(f"{timestamp if is_row else name}{glue}{rest}")
-        else:
-            rows.append(rest)
+        is_row = re.match(r"\s*[-+.\d]", rest) is not None
+        rows.append(f"{timestamp if is_row else name}{glue}{rest}" if timestamp and rest.strip() else rest)
     return Rewritten.of(rows, range(1, len(rows) + 1))
 
 
@@ -219,32 +208,32 @@ _MOST_RECORDS_SEEN = 4000
 _WORD = re.compile(r"\$?[^\W\d]\w*:?$")
 
 
-def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None:
+def split_records(text: str) -> tuple[dict[str, Rewritten], dict[str, int]] | None:
     """The lines of ``accelerometer`` and ``gyroscope``, each with its header; and the number of lines by first word.
 
     None where the first words do not identify both sensors.
     """
-    lines = lines_of(text)
+    lines = text.split("\n")
     separator = _separator(lines[:_MOST_RECORDS_SEEN])
     if separator is None:
         return None
-    first = [_first_word(line, separator) for line in lines]
-    counts = Counter(word for word in first if word)
-    if len(counts) > 64:
+    rows: dict[str, list[int]] = {}
+    headers: dict[str, int] = {}
+    for i, line in enumerate(lines):
+        word, *fields = split(line.lstrip("#%/ \t"), separator) or [""]
+        if fields and _WORD.match(word):
+            if not any(is_number(field, False) for field in fields):
+                headers.setdefault(word, i)
+            elif not line.startswith(("#", "%", "/")):
+                rows.setdefault(word, []).append(i)
+    words = {kind: pick_kind(list(rows), kind) or "" for kind in SENSORS}
+    if len(rows) > _MOST_LABELS or any(len(rows.get(word, ())) < 2 for word in words.values()):
         return None
     out: dict[str, Rewritten] = {}
-    for kind in ("accelerometer", "gyroscope"):
-        word = pick_kind(list(counts), kind)
-        if word is None or counts[word] < 2:
-            return None
-        numbers = [i for i, w in enumerate(first, start=1) if w == word]
-        rows = [lines[i - 1] for i in numbers]
-        header = next((i for i, line in enumerate(lines, start=1) if _is_header(line, word, separator)), None)
-        if header is not None:
-            rows.insert(0, re.sub(r"^[#%/\s]*", "", lines[header - 1]))
-            numbers.insert(0, header)
-        out[kind] = Rewritten.of(rows, numbers)
-    return out, counts
+    for kind, word in words.items():
+        numbers = [*([headers[word]] if word in headers else []), *rows[word]]
+        out[kind] = Rewritten.of([lines[i].lstrip("#%/ \t") for i in numbers], [i + 1 for i in numbers])
+    return out, {word: len(held) for word, held in rows.items()}
 
 
 def _separator(lines: list[str]) -> str | None:
@@ -258,22 +247,3 @@ def _separator(lines: list[str]) -> str | None:
         if len(fitting) >= max(4.0, 0.5 * len(rows)) and len({r[0] for r in fitting}) >= 2:
             return separator
     return None
-
-
-def _first_word(line: str, separator: str) -> str:
-    """The record type of a line with numbers; "" for remarks, names and blank lines."""
-    if not line or not (line[0].isalpha() or line[0] in "$_"):
-        return ""
-    word, found, rest = line.partition(separator)
-    if not found or not _WORD.match(word.strip()):
-        return ""
-    return word.strip() if re.search(r"\d", rest) and not _is_names(rest, separator) else ""
-
-
-def _is_names(rest: str, separator: str) -> bool:
-    return not any(is_number(field, False) for field in split(rest, separator))
-
-
-def _is_header(line: str, word: str, separator: str) -> bool:
-    plain = re.sub(r"^[#%/\s]*", "", line)
-    return plain.startswith(word + separator) and _is_names(plain[len(word) + 1 :], separator)

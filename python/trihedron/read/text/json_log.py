@@ -32,11 +32,11 @@ def of_json(path: Path, text: str) -> Rewritten:
 
     Raises ``ReadError`` when the text is damaged, or contains no rows of readings.
     """
-    lines: list[int] | None
     try:
-        rows, lines = _of_value(json.loads(text)), None
+        rows = _of_value(json.loads(text))
+        numbers = list(range(1, len(rows) + 1))
     except ValueError:
-        rows, lines = _of_lines(path, text)
+        rows, numbers = _of_lines(path, text)
     except RecursionError:
         raise ReadError(f"{path}: this JSON nests too deep to be a log.") from None
     names = list(dict.fromkeys(name for row in rows for name in row))
@@ -47,34 +47,28 @@ def of_json(path: Path, text: str) -> Rewritten:
             "trihedron.read({'t': ..., 'ax': ...})."
         )
     body = [",".join(_cell(row.get(name)) for name in names) for row in rows]
-    numbers = list(range(1, len(rows) + 1)) if lines is None else lines
-    head = ",".join(name.replace(",", " ") for name in names)
-    return Rewritten.of([head, *body], [numbers[0], *numbers])
+    return Rewritten.of([",".join(name.replace(",", " ") for name in names), *body], [numbers[0], *numbers])
 
 
 Row = dict[str, Any]
 
 
 def _of_lines(path: Path, text: str) -> tuple[list[Row], list[int]]:
-    rows: list[Row] = []
-    numbers: list[int] = []
-    lines = text.split("\n")
-    last = max((i for i, line in enumerate(lines) if line.strip()), default=-1)
-    packets: list[tuple[int, Any]] = []
-    for i, line in enumerate(lines):
-        if not line.strip():
-            continue
-        try:
-            packets.append((i + 1, json.loads(line)))
-        except (ValueError, RecursionError) as error:
-            if i == last and packets:  # an incomplete last line becomes an empty row
-                packets.append((i + 1, {}))
-                continue
-            raise ReadError(f"{path}: line {i + 1} is no JSON ({str(error)[:80]}); mend or delete it.") from None
-    for (number, _), part in zip(packets, _spread([value for _, value in packets]), strict=True):
-        rows += part
-        numbers += [number] * len(part)
-    return rows, numbers
+    lines = [(number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip()]
+    packets = [_packet(path, number, line, is_last=number == lines[-1][0] > lines[0][0]) for number, line in lines]
+    parts = _spread(packets)
+    numbers = [number for (number, _), part in zip(lines, parts, strict=True) for _ in part]
+    return [row for part in parts for row in part], numbers
+
+
+def _packet(path: Path, number: int, line: str, *, is_last: bool) -> Any:
+    """The value of a line; an incomplete last line becomes an empty row."""
+    try:
+        return json.loads(line)
+    except (ValueError, RecursionError) as error:
+        if is_last:
+            return {}
+        raise ReadError(f"{path}: line {number} is no JSON ({str(error)[:80]}); mend or delete it.") from None
 
 
 def _of_value(value: Any) -> list[Row]:
@@ -87,14 +81,13 @@ def _of_value(value: Any) -> list[Row]:
         tables = [v for v in columns.values() if isinstance(v[0], Mapping)]
         if tables:
             return _of_value(max(tables, key=len))
-        columns = {k: v for k, v in columns.items() if not isinstance(v[0], Mapping)}
         longest = max(map(len, columns.values()), default=0)
-        kept = {k: v for k, v in columns.items() if len(v) == longest}
-        return [_flat({k: v[i] for k, v in kept.items()}) for i in range(longest)]
-    if isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
-        return [row for part in _spread(value) for row in part]
-    if isinstance(value, list) and value and all(isinstance(v, list) for v in value) and isinstance(value[0][0], str):
-        return [dict(zip(value[0], row, strict=False)) for row in value[1:]]
+        return [_flat({k: v[i] for k, v in columns.items() if len(v) == longest}) for i in range(longest)]
+    items: list[Any] = value if isinstance(value, list) and value else [None]
+    if all(isinstance(item, Mapping) for item in items):
+        return [row for part in _spread(items) for row in part]
+    if all(isinstance(item, list) for item in items) and isinstance(items[0][0], str):
+        return [dict(zip(items[0], row, strict=False)) for row in items[1:]]
     return []
 
 

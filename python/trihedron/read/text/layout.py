@@ -17,7 +17,9 @@ _UNIT_WORD = re.compile(
     r"|°?c|degc|degrees celsius|k?pa|y|-)?[\])]?$",
     re.IGNORECASE,
 )
-_QUALIFIERS = frozenset({"cal", "uncal", "raw", "calibrated", "uncalibrated"})
+_QUALIFIER = re.compile(r"(cal|uncal|raw|calibrated|uncalibrated)$", re.IGNORECASE)
+_CANDIDATES = ((",", False), ("\t", False), (";", False), (" ", False), (";", True), ("\t", True), (" ", True))
+"""Separators, and whether with decimal commas; of equal scores the first is taken."""
 _JUDGED = 200
 """Lines from which the separator is determined."""
 MAX_STRAY_LINES = 20
@@ -91,46 +93,36 @@ def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float
 
 def detect(text: str) -> Layout | None:
     """Layout of a text log from its first lines, or None where no line of numbers is found."""
-    lines = [line.strip("\r") for line in text.split("\n")] if "\r" in text else text.split("\n")
+    lines = text.split("\n")
     tail = _from_the_end(lines)
-    candidates = [(",", False), ("\t", False), (";", False), (" ", False), (";", True), ("\t", True), (" ", True)]
-    # Separators that occur in no line all give the same score.
-    found = {(sep, comma): sep if any(sep in line for line in tail) else "\0" for sep, comma in candidates}
-    scores: dict[tuple[str, bool], tuple[float, int]] = {}
-    # Separators that occur are tried first: a score of 1 cannot be exceeded, and others cannot reach it.
-    for key in sorted(dict.fromkeys((found[key], key[1]) for key in candidates), key=lambda key: key[0] == "\0"):
-        scores[key] = _judge(tail, *key)
-        if scores[key][0] == 1.0:
-            break
-    judged = [(scores.get((found[key], key[1]), (0.0, 0)), -i, *key) for i, key in enumerate(candidates)]
-    (score, n_fields), _, separator, decimal_comma = max(judged, key=lambda j: (j[0][0], j[1]))
-    if score <= 0.0:
-        return None
-    first = _first_data_line(lines, separator, decimal_comma, n_fields)
+    score, n_fields, separator, decimal_comma = 0.0, 0, "", False
+    for candidate in [one for one in _CANDIDATES if any(one[0] in line for line in tail)] or _CANDIDATES[:1]:
+        judged = _judge(tail, *candidate)
+        if judged[0] > score:
+            (score, n_fields), (separator, decimal_comma) = judged, candidate
+    first = _first_data_line(lines, separator, decimal_comma, n_fields) if score > 0.0 else None
     if first is None:
         return None
     first, rate = _past_start_and_rate(lines, first, separator)
-    trailing = separator != " " and n_fields > 1 and all(line.rstrip(" ").endswith(separator) for line in tail)
+    trailing = separator != " " and n_fields > 1 and all(line.endswith(separator) for line in tail)
     header = _header(lines[:first], separator, n_fields - trailing)
     if trailing and header.names is None:
         # A separator at the line end precedes an empty last cell where the header has a name for it.
         with_last = _header(lines[:first], separator, n_fields)
         if with_last.names is not None:
             header, trailing = with_last, False
-    n_kept = n_fields - trailing
     stray = () if rate else _stray(lines[:first], header, decimal_comma)
     # Remarks count from the names on, even ignored ones, or from the first line that may be a row.
-    named = [i for i in range(first) if header.ignored and lines[i].strip() == header.ignored]
-    above = min(max(header.used, default=first), stray[0] - 1 if stray else first, *named)
+    above = min(max(header.used, default=first), *(i - 1 for i in stray[:1]), *header.ignored, first)
     return Layout(
         separator,
         decimal_comma,
-        n_kept,
+        n_fields - trailing,
         trailing,
         first + 1,
         header.names,
         header.metadata | rate,
-        header.ignored,
+        lines[header.ignored[0]].strip() if header.ignored and header.names is None else "",
         stray,
         sum(_looks_like_row(lines[i - 1], decimal_comma, 4) for i in stray),
         tuple(i + 1 for i in range(above + 1, first) if lines[i].strip().startswith(COMMENT_STARTS)),
@@ -199,57 +191,49 @@ def _first_data_line(lines: list[str], separator: str, decimal_comma: bool, n_fi
 class _Header:
     names: tuple[str, ...] | None
     metadata: dict[str, str]
-    ignored: str
-    used: tuple[int, ...]
+    ignored: tuple[int, ...] = ()
+    """The last line (from 0) that is neither names nor a remark, where there are no names."""
+    used: tuple[int, ...] = ()
     """Lines (from 0) that became names, units or qualifiers of names."""
 
 
 def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
     metadata: dict[str, str] = {}
-    matching: list[tuple[int, list[str]]] = []
-    ignored = ""
-    for i, raw in enumerate(lines):
-        line = raw.strip()
+    matching: dict[int, list[str]] = {}
+    ignored: tuple[int, ...] = ()
+    for i, line in enumerate(line.strip() for line in lines):
         if not line or line.strip('"').lower().startswith("sep="):
             continue
-        plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if line.startswith(COMMENT_STARTS) else line
         # GCDC's loggers write "Headers" before the names.
-        plain = re.sub(r"^headers\s*,\s*", "", plain, flags=re.IGNORECASE)
-        fields = _header_fields(plain, separator, n_fields)
-        fields = _numbered_on(fields) if fields is not None else None
-        if fields is not None and any(fields) and not any(is_number(f, False) for f in fields):
-            matching.append((i, fields))
+        plain = re.sub(r"^((#+|%+|//+)\s*)?(headers\s*,\s*)?", "", line, flags=re.IGNORECASE)
+        fields = _numbered_on(_header_fields(plain, separator, n_fields))
+        if any(fields) and not any(is_number(f, False) for f in fields):
+            matching[i] = fields
             continue
         pair = re.match(r"\s*([^:=,;\t]+?)\s*[:=,;\t]\s*([^,;\t]+?)[\s,;]*$", plain)
         if pair and not is_number(pair.group(1), False):
             metadata[pair.group(1)] = pair.group(2)
         elif not line.startswith(COMMENT_STARTS):
-            ignored = line
+            ignored = (i,)
     if not matching:
-        return _Header(None, metadata | stated_units(lines), ignored, ())
-    units: list[str] = []
-    qualifiers: list[str] = []
-    used = [matching[-1][0]]
+        return _Header(None, metadata | stated_units(lines), ignored)
     # Names, then CAL or RAW, then units, as Shimmer writes; or names and units.
-    while len(matching) > 1:
-        row = matching[-1][1]
-        is_below_names = _names_sensors(matching[-2][1]) and not _names_sensors(row)
-        if not units and (_share(row, _UNIT_WORD) >= 0.6 or is_below_names):
-            units = row
-        elif not qualifiers and _share(row, _QUALIFIERS) == 1.0:
-            qualifiers = row
+    (at, names), *above = reversed(matching.items())
+    used, units, qualifiers = [at], [""] * n_fields, [""] * n_fields
+    for at, row in above:
+        is_below_names = _names_sensors(row) and not _names_sensors(names)
+        if not any(units) and (_share(names, _UNIT_WORD) >= 0.6 or is_below_names):
+            units = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit.strip("-") for unit in names]
+        elif not any(qualifiers) and _share(names, _QUALIFIER) == 1.0:
+            qualifiers = names
         else:
             break
-        matching.pop()
-        used.append(matching[-1][0])
-    names = matching[-1][1]
-    if qualifiers:
-        names = [f"{name} {word}".strip() for name, word in zip(names, qualifiers, strict=True)]
-    if units:
-        bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit.strip("-") for unit in units]
-        names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, bare, strict=True)]
+        names = row
+        used.append(at)
+    parts = zip(names, qualifiers, units, strict=True)
+    full = [f"{name} {word}".strip() + (f" [{unit}]" if unit else "") for name, word, unit in parts]
     metadata |= stated_units(line for i, line in enumerate(lines) if i not in used)
-    return _Header(tuple(names), metadata, "", tuple(used))
+    return _Header(tuple(full), metadata, used=tuple(used))
 
 
 def _numbered_on(fields: list[str]) -> list[str]:
@@ -265,13 +249,13 @@ def _names_sensors(fields: list[str]) -> bool:
     return any(parse_name(f).role in ("accelerometer", "gyroscope") for f in fields)
 
 
-def _share(fields: list[str], test: re.Pattern[str] | frozenset[str]) -> float:
-    filled = [f for f in fields if f]
-    hits = sum(bool(test.match(f)) if isinstance(test, re.Pattern) else f.lower() in test for f in filled)
-    return hits / len(filled) if filled else 1.0
+def _share(fields: list[str], test: re.Pattern[str]) -> float:
+    hits = [test.match(f) is not None for f in fields if f]
+    return sum(hits) / len(hits) if hits else 1.0
 
 
-def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None:
+def _header_fields(line: str, separator: str, n_fields: int) -> list[str]:
+    """The ``n_fields`` fields of a line by any separator; empty where none gives so many."""
     # Names of several words are separated by two or more blanks.
     aligned = re.split(r"\s{2,}", line.strip())
     for fields in (*(split(line, sep) for sep in (separator, ",", "\t", ";", " ")), aligned):
@@ -279,7 +263,7 @@ def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None
             fields.pop()
         if len(fields) == n_fields:
             return fields
-    return None
+    return []
 
 
 # Units stated in lines above a table: ``# acceleration in g, angular rate in deg/h``.

@@ -3,7 +3,7 @@ counts."""
 
 import re
 
-from trihedron.read.text.dialect import Rewritten, lines_of
+from trihedron.read.text.dialect import Rewritten
 
 _COUNTS = r"(-?\d+),(-?\d+),(-?\d+),(-?\d+),(-?\d+),(-?\d+)"
 _MESSAGE = re.compile(
@@ -21,7 +21,7 @@ def rewritten(text: str) -> Rewritten | None:
     """
     if "RAWIMU" not in text[:100_000]:
         return None
-    lines = lines_of(text)
+    lines = text.split("\n")
     rows, numbers, n_messages = [_HEADER], [1], 0
     for number, line in enumerate(lines, start=1):
         if not line.strip():

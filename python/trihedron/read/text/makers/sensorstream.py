@@ -2,7 +2,7 @@
 
 import re
 
-from trihedron.read.text.dialect import NEARLY_ALL, Rewritten, lines_of
+from trihedron.read.text.dialect import NEARLY_ALL, Rewritten
 
 _NUMBER = r"\s*[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?\s*"
 _LINE = re.compile(rf"{_NUMBER}(?:,\s*\d{{1,2}}\s*(?:,{_NUMBER}){{3}})+,?\s*")
@@ -13,7 +13,7 @@ _JUDGED = 200
 
 def rewritten(text: str) -> Rewritten | None:
     """A table of time, accelerometer [m/s²], gyro [rad/s] and magnetometer [µT]; None for another format."""
-    lines = lines_of(text)
+    lines = text.split("\n")
     sample = [line for line in lines[:_JUDGED] if line.strip()]
     if not sample or not _LINE.fullmatch(sample[0]) or "3" not in {s.strip() for s in sample[0].split(",")[1::4]}:
         return None
