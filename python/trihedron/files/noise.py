@@ -14,7 +14,7 @@ from trihedron.records.noise import NOT_OF_THE_SENSOR, GaussMarkov, NoiseAxis, N
 from trihedron.records.plain import from_plain
 
 MEANT = "name a file written by `trihedron allan --json`"
-_OF_A_TERM = ("value", "sigma", "lower", "upper", "limit", "evidence", "estimate", "fitted")
+_OF_A_TERM = ("sigma", "lower", "upper", "evidence", "estimate", "fitted")
 _SENSORS = {"m/s^2": "accelerometer", "rad/s": "gyroscope"}
 
 

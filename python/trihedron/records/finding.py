@@ -157,7 +157,6 @@ class FindingCode(str, Enum):
     SPECTRUM_LOW_PASS = "spectrum-low-pass"
     SPECTRUM_UNEXPLAINED = "spectrum-unexplained"
     CURVE_ALONE = "curve-alone"
-    RAMP_OR_WALK = "ramp-or-walk"
     SLOW_NOISE_UNRESOLVED = "slow-noise-unresolved"
     QUANTISATION_DEAD = "quantisation-dead"
     STRETCHES_EXCLUDED = "stretches-excluded"

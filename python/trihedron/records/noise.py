@@ -43,23 +43,31 @@ class TermName(str, Enum):
 class NoiseTerm:
     """One noise term of IEEE 952, estimated with all other terms free.
 
-    ``lower`` and ``upper`` are the 95 % interval; ``limit`` is its upper end. Both are valid whether the term is
-    detected or not. ``is_present``: the log determines the term by itself; ``value`` is 0 where it does not, otherwise
-    ``estimate``: the maximum of the likelihood for Q and N, the median of the likelihood for B, K and R. ``sigma`` is
-    its standard uncertainty. ``fitted`` is the term's value in the most likely sum of all terms, from which variances
-    of means are computed. ``evidence`` is the rise of the deviance (−2 ln likelihood) without the term.
+    ``lower`` and ``upper`` are the 95 % interval, valid whether the term is detected or not. ``is_present``: the log
+    determines the term by itself. ``estimate`` is the maximum of the likelihood for Q and N, its median for B, K and R;
+    ``sigma`` its standard uncertainty, 0 where the term is not present. ``evidence`` is the rise of the deviance
+    (−2 ln likelihood) without the term. ``fitted`` is the term's value in the most likely sum of all terms, from which
+    variances of means are computed.
     """
 
     symbol: TermName
     is_present: bool
-    value: float
+    estimate: float
     sigma: float
     lower: float
     upper: float
-    limit: float
     evidence: float
-    estimate: float = 0.0
-    fitted: float = 0.0
+    fitted: float
+
+    @property
+    def value(self) -> float:
+        """The estimate, 0 where the term is not present."""
+        return self.estimate if self.is_present else 0.0
+
+    @property
+    def limit(self) -> float:
+        """Upper end of the interval, the most that an absent term may be."""
+        return self.upper
 
 
 @dataclass(frozen=True)

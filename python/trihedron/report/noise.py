@@ -58,7 +58,7 @@ def noise_report(
             Section("Findings", (findings_block(findings),)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
             *((Section("Figures", tuple(_picture(noise, *group) for group in groups)),) if groups else ()),
-            *_intervals(groups),
+            Section("Intervals", tuple(_intervals_table(axes, unit) for unit, axes in groups)),
             *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
             Section("Kalibr", _kalibr(noise)),
         ),
@@ -188,13 +188,6 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
 def _by_axis(axes: Sequence[NoiseAxis], rows: Sequence[tuple[str, ...]], caption: str) -> Table:
     """A column per axis."""
     return Table(("", *(axis_in_print(axis.name) for axis in axes)), tuple(rows), caption)
-
-
-def _intervals(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Section]:
-    """Intervals of all terms; none for a curve without its log, which has no intervals with all terms free."""
-    if any(axis.slow_pair is None for _, axes in groups for axis in axes):
-        return []
-    return [Section("Intervals", tuple(_intervals_table(axes, unit) for unit, axes in groups))]
 
 
 def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:

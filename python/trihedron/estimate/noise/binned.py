@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
@@ -25,6 +24,9 @@ SLOW_TERMS = (2, 3)
 
 TOLERANCE_GAUSS_MARKOV = 0.02
 """Relative uncertainty of a half octave in the search for a Gauss-Markov process."""
+
+UNLIKELY = 4.0
+"""Deviation of a half octave, in standard errors, that chance explains once in 400 logs of 20 octaves."""
 
 BIN_WIDTH = 1.025
 """Ratio of the edges of a bin: the density of a random walk varies by 5 % inside it, and its mean is used."""
@@ -63,14 +65,34 @@ class BinnedSpectrum:
         """The most likely strengths of all terms, the columns integrated out."""
         return self.likelihood.fit(range(len(self.basis)))
 
-    def expectation(self, strength: npt.ArrayLike) -> FloatArray:
-        """(b,) expected power for the strengths (squares) of the terms."""
-        return np.asarray(np.asarray(strength) @ self.basis)
+    def ratio(self, fit: _core.SpectralFit | None = None) -> FloatArray:
+        """(b,) power after subtraction of the columns over its expectation by ``fit``, its own by default."""
+        fit = self.fit if fit is None else fit
+        s = np.asarray(fit.columns)
+        power = self.power - 2.0 * s @ self.cross + np.einsum("i,j,ijb->b", s, s, self.square)
+        return np.asarray(power / (np.asarray(fit.strength) @ self.basis))
 
-    def without_columns(self, size: npt.ArrayLike) -> FloatArray:
-        """(b,) power after subtraction of the columns times ``size`` (c,)."""
-        s = np.asarray(size)
-        return np.asarray(self.power - 2.0 * s @ self.cross + np.einsum("i,j,ijb->b", s, s, self.square))
+    def below(self, highest_hz: float) -> BinnedSpectrum:
+        """The bins up to ``highest_hz``."""
+        low = self.frequency_hz <= highest_hz
+        return BinnedSpectrum(*(getattr(self, one.name)[..., low] for one in fields(self)))
+
+    def tempered(self) -> tuple[BinnedSpectrum, float, tuple[float, float] | None]:
+        """The bins with less weight on half octaves that the terms do not explain, z² as variance factor (Birge ratio).
+
+        Also the largest factor, and the worst deviation of the power, with its frequency, where it exceeds 10 %.
+        """
+        octaves = np.log2(self.frequency_hz / self.frequency_hz[0])
+        group = np.unique(np.floor(2.0 * octaves), return_inverse=True)[1]
+        n = np.bincount(group, self.count)
+        mean = np.bincount(group, self.count * self.ratio()) / n
+        # Cube root: nearly normal for few degrees of freedom (Wilson-Hilferty).
+        z = (np.maximum(mean, 0.0) ** (1 / 3) - (1 - 2 / (9 * n))) / np.sqrt(2 / (9 * n))
+        factor = np.where(np.abs(z) > UNLIKELY, z**2, 1.0)
+        off = np.where(factor > 1.0, mean - 1.0, 0.0)
+        worst = int(np.argmax(np.abs(off)))
+        far = (float(off[worst]), float(np.mean(self.frequency_hz[group == worst]))) if abs(off[worst]) > 0.1 else None
+        return replace(self, count=self.count / factor[group]), float(factor.max()), far
 
 
 def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolArray] | None = None) -> BinnedSpectrum:

@@ -1,31 +1,39 @@
-"""Noise terms of published or stored Allan curves (docs/noise.md, section 5)."""
+"""Noise terms of published or stored Allan curves (docs/noise.md, section 5).
 
-import math
+The points of a curve an octave apart are the bins of a spectrum: a sum of the terms' Allan variances, each chi-square
+with its degrees of freedom. Neighbours share readings; white noise has twice the degrees of freedom of its log in them.
+"""
+
 from collections.abc import Sequence
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtrc
 
-from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import check_question, curve_with_intervals
-from trihedron.estimate.noise.axis import LEAST_EDF
-from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
-from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
-from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.estimate.noise.axis import blank_axis, longest_tau_s, stated
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model
+from trihedron.estimate.noise.remarks import about_terms
+from trihedron.estimate.noise.screening import Readout
+from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis
+from trihedron.records.noise import allan_of_unit_terms
 
 FEWEST_POINTS = 6
 STEP = 1.9
-"""Least ratio of neighbouring averaging times that are used: closer points share nearly all their readings."""
+"""Least ratio of neighbouring averaging times that are used."""
+SHARED = 0.5
+"""Degrees of freedom of the log over the sum of those of points an octave apart: white noise of n readings has 1.95 n
+in these."""
+LEAST_EDF = 1.5
+"""Fewest degrees of freedom of a point: with fewer it adds nothing to its neighbours."""
 CHANCE = 1e-4
-"""p-value of χ² below which a sum of noise terms does not explain a curve."""
+"""p-value of the points below which a sum of noise terms does not explain them."""
 MARGIN = 2
-TOLERANCE = 0.01
-"""Relative standard deviation added to every point of a curve on which low-pass filtering was detected."""
+"""Points beyond those that no sum of terms explains: the effect of a filter halves per octave."""
+TOLERANCE = 0.02
+"""Relative standard deviation of every variance of a curve on which low-pass filtering was detected."""
 
 
 def identify_curve(
@@ -62,64 +70,54 @@ def identify_curve(
             f"averaging times are whole numbers of readings: at {rate_hz:g} Hz these are not; check --rate"
         )
     kept = np.concatenate([[True], np.diff(clusters) > 0]) & (2 * clusters <= n_samples)
-    tau, sigma, clusters = tau[kept], sigma[kept], clusters[kept]
-    channels = sigma.shape[1]
-    terms = np.repeat((n_samples - 2 * clusters + 1)[:, np.newaxis], channels, axis=1)
-    curve = curve_with_intervals(
-        "overlapping",
-        rate_hz,
-        n_samples,
-        clusters,
-        sigma**2,
-        terms,
-        terms.astype(np.float64),
-        0.95,
-        tuple(names),
-        tuple(units),
-    )
+    sigma, clusters = sigma[kept], clusters[kept]
+    terms = np.repeat((n_samples - 2 * clusters + 1)[:, np.newaxis], sigma.shape[1], axis=1)
+    named, weight = (tuple(names), tuple(units)), terms.astype(np.float64)
+    curve = curve_with_intervals("overlapping", rate_hz, n_samples, clusters, sigma**2, terms, weight, 0.95, *named)
     alone = Finding.of(FindingCode.CURVE_ALONE)
-    return Noise(tuple(_axis(curve, c) for c in range(channels)), curve, source, findings=(alone,))
+    return Noise(tuple(_axis(curve, c) for c in range(sigma.shape[1])), curve, source, findings=(alone,))
 
 
 def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
-    points, fit, evidence, scale, findings = _screened(_usable(curve, channel))
-    terms = {}
-    for k, term in enumerate(TERMS):
-        low, high = (math.sqrt(square) for square in points.interval(fit, k, scale))
-        if k in fit.active:
-            value = math.sqrt(fit.squares[k])
-            place = fit.active.index(k)
-            error = 0.5 * value * math.sqrt(scale * fit.covariance[place, place])
-            terms[term] = NoiseTerm(term, True, value, error, low, high, high, evidence[k], value, value)
-        else:
-            terms[term] = NoiseTerm(term, False, 0.0, 0.0, 0.0, high, high, evidence[k])
-    usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
-    first = float(points.tau_s[0])
-    axis = NoiseAxis(
-        name=curve.names[channel],
-        unit=curve.units[channel],
-        rate_hz=curve.rate_hz,
-        n_samples=curve.n_samples,
-        duration_s=curve.n_samples / curve.rate_hz,
-        mean=math.nan,
-        sample_sigma=float(curve.deviation[0, channel]) * math.sqrt(float(curve.clusters[0])),
-        resolution=0.0,
-        terms=MappingProxyType(terms),
-        lowest_hz=0.5 / float(points.tau_s[-1]),
-        highest_hz=0.5 / first,
-        longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
-        covariance_scale=scale,
+    every = points = _points(curve, channel)
+    findings: list[Finding] = []
+    while len(points.count) > FEWEST_POINTS and _is_unlikely(points):
+        points = points.below(points.frequency_hz[-2]).capped(TOLERANCE)
+    left = len(every.count) - len(points.count)
+    if left and len(points.count) == FEWEST_POINTS and _is_unlikely(points):
+        # Excluding points does not help: the cause is not at short averaging times.
+        points, left = every.capped(TOLERANCE), 0
+    if left:
+        last = -1 - min(MARGIN, len(points.count) - FEWEST_POINTS)
+        points = points.below(points.frequency_hz[last])
+        findings.append(
+            Finding.of(FindingCode.SPECTRUM_LOW_PASS, "curve", first_s=0.5 / float(points.frequency_hz[-1]))
+        )
+    sample_sigma = float(curve.deviation[0, channel] * np.sqrt(curve.clusters[0]))
+    written, n = Readout(0.0, sample_sigma, 0.0, 0.0), curve.n_samples
+    blank = blank_axis(curve.names[channel], curve.units[channel], curve.rate_hz, n, np.nan, written)
+    blank = replace(
+        blank,
+        highest_hz=float(points.frequency_hz[-1]),
+        longest_tau_s=longest_tau_s(curve, channel),
+        findings=tuple(findings),
     )
-    ramp = [Finding.of(FindingCode.RAMP_OR_WALK)] if terms[TermName.RATE_RAMP].is_present else []
-    return replace(axis, findings=(*findings, *ramp, *remarks.about_terms(axis)))
+    axis = stated(Model(points), blank)
+    return replace(axis, findings=(*axis.findings, *about_terms(axis)))
 
 
-def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
-    """Points about an octave apart with at least ``LEAST_EDF_OF_A_POINT`` degrees of freedom."""
-    good = np.isfinite(curve.deviation[:, channel]) & (curve.deviation[:, channel] > 0.0)
-    good &= curve.edf[:, channel] >= LEAST_EDF_OF_A_POINT
+def _is_unlikely(points: BinnedSpectrum) -> bool:
+    """Whether chance does not explain the deviance of the points from the sum of all terms."""
+    ratio = points.ratio()
+    return bool(chdtrc(max(len(ratio) - len(points.basis), 1), points.count @ (ratio - 1.0 - np.log(ratio))) < CHANCE)
+
+
+def _points(curve: AllanCurve, channel: int) -> BinnedSpectrum:
+    """Points about an octave apart with at least ``LEAST_EDF`` degrees of freedom, at half the inverse of their times;
+    the ramp is a fifth term, which changes points as noise does: a walk that happened to go one way has its curve."""
+    deviation, edf = curve.deviation[:, channel], curve.edf[:, channel]
     chosen: list[int] = []
-    for i in np.flatnonzero(good).tolist():
+    for i in np.flatnonzero((deviation > 0.0) & (edf >= LEAST_EDF)).tolist():
         if not chosen or curve.clusters[i] >= STEP * curve.clusters[chosen[-1]]:
             chosen.append(i)
     if len(chosen) < FEWEST_POINTS:
@@ -127,43 +125,12 @@ def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
             f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to separate noise terms; "
             f"at least {FEWEST_POINTS} are needed"
         )
-    return CurvePoints.of(
-        curve.clusters[chosen].astype(np.float64), curve.variance[chosen, channel], curve.n_samples, curve.rate_hz
+    tau_s = curve.tau_s[chosen[::-1]]
+    return BinnedSpectrum(
+        frequency_hz=0.5 / tau_s,
+        count=SHARED * edf[chosen[::-1]],
+        power=curve.variance[chosen[::-1], channel],
+        cross=np.empty((0, len(chosen))),
+        square=np.empty((0, 0, len(chosen))),
+        basis=np.stack(list(allan_of_unit_terms(tau_s).values())),
     )
-
-
-def _screened(points: CurvePoints) -> tuple[CurvePoints, CurveFit, FloatArray, float, list[Finding]]:
-    """The points without short averaging times that no sum of terms explains, their fit, the evidence (5,) of its
-    terms, the factor on variances by the remaining misfit, and findings."""
-    findings: list[Finding] = []
-    first, most = 0, len(points.clusters) - FEWEST_POINTS
-    used = points
-    while first < most and _is_unlikely(used):
-        first += 1
-        used = points.from_point(first, TOLERANCE)
-    if _is_unlikely(used) and first == most:
-        # Excluding points does not help: the cause is not at short averaging times.
-        first, used = 0, points.from_point(0, TOLERANCE)
-    if first:
-        # The effect of a filter halves per octave: two more points reduce it below the tolerance.
-        first = min(first + MARGIN, most)
-        used = points.from_point(first, TOLERANCE)
-        findings.append(Finding.of(FindingCode.SPECTRUM_LOW_PASS, "curve", first_s=float(used.tau_s[0])))
-    fit, evidence = used.select()
-    chi2, z = used.misfit(fit.squares)
-    dof = len(used.clusters) - len(fit.active)
-    scale = 1.0
-    if chdtrc(dof, chi2) < CHANCE:
-        scale = chi2 / dof
-        worst = int(np.argmax(np.abs(z)))
-        share = math.sqrt(used.variance[worst] / float(used.design[worst] @ fit.squares)) - 1.0
-        findings.append(
-            Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, "curve", deviation=share, tau_s=float(used.tau_s[worst]))
-        )
-    return used, fit, evidence, scale, findings
-
-
-def _is_unlikely(points: CurvePoints) -> bool:
-    everything = points.fit(range(len(TERMS)), points.alone())
-    chi2, _ = points.misfit(everything.squares)
-    return bool(chdtrc(max(1, len(points.clusters) - len(TERMS)), chi2) < CHANCE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -15,7 +15,7 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
-from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
+from trihedron.estimate.noise.axis import blank_axis, identify_axis
 from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import (
     Event,
@@ -35,8 +35,8 @@ from trihedron.estimate.noise.slow_changes import (
     slow_changes,
     without,
 )
-from trihedron.estimate.noise.spectrum import ordinates
-from trihedron.estimate.noise.two_levels import TwoLevels, two_levels
+from trihedron.estimate.noise.spectrum import Ordinates, ordinates
+from trihedron.estimate.noise.two_levels import two_levels
 from trihedron.ranges import merged
 from trihedron.records import AllanCurve, Finding, FindingCode
 from trihedron.records.noise import FEWEST_READINGS, Noise, NoiseAxis
@@ -45,6 +45,8 @@ ACCELEROMETER = ("accel x", "accel y", "accel z")
 """Names of the channels that show gravity."""
 MOST_DISTURBED = 0.25
 """Largest share of an axis that is excluded automatically."""
+SHORTEST_STRETCH = 64
+"""Fewest readings, or means, between two steps that are used."""
 
 
 def identify_noise(
@@ -110,82 +112,143 @@ def identify_noise(
             "needed, an hour or more is useful"
         )
     heat = None if temperature_degc is None else _heat(as_readings(temperature_degc), n)
-    range_degc = remarks.UNLOGGED if heat is None else (float(np.min(heat)), float(np.max(heat)))
     excluded = [_checked_stretch(stretch, n, rate_hz) for stretch in exclude_s]
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
     if repeated > 0.001:
         findings.append(Finding.of(FindingCode.REPEATED_ROWS, "static", share=repeated))
 
-    def undisturbed(c: int) -> _Undisturbed:
-        column = np.array(readings[:, c], dtype=np.float64)
-        _leave_out(column, excluded)
-        if not np.any(np.isfinite(column)):
+    def undisturbed(c: int) -> Channel:
+        one = Channel(np.array(readings[:, c], dtype=np.float64), rate_hz, names[c], units[c])
+        one.leave_out(excluded)
+        if not np.any(np.isfinite(one.column)):
             raise InputError(f"{names[c]} holds no finite reading outside the excluded stretches")
-        return _without_events(column, rate_hz, units[c]) if automatic else _Undisturbed(column, [], [], [])
+        return one.without_events() if automatic else one
+
+    def identified(c: int) -> NoiseAxis:
+        one = seen[c]
+        return one.identified(ordinates, one.blank(), curve, c, tail_error(one.column), heat)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        quiet = list(pool.map(undisturbed, range(channels)))
-        cuts = merged([*excluded, *(cut for one in quiet for cut in one.cuts)])
+        seen = list(pool.map(undisturbed, range(channels)))
+        cuts = merged([*excluded, *(cut for one in seen for cut in one.cuts)])
         # What moves one axis of a body disturbs the others, less visibly: an interval is excluded from all.
-        for one in quiet:
-            _leave_out(one.column, cuts)
-
-        def screened(c: int) -> _Screened:
-            return _screen(quiet[c], rate_hz, (names[c], units[c]), heat, automatic=automatic)
-
-        seen = list(pool.map(screened, range(channels)))
+        for one in seen:
+            one.leave_out(cuts)
+        if automatic:
+            seen = list(pool.map(lambda one: one.without_changes(heat), seen))
         if cuts:
             total = sum(b - a for a, b in cuts)
-            findings.append(
-                Finding.of(
-                    FindingCode.STRETCHES_EXCLUDED,
-                    n_stretches=len(cuts),
-                    excluded_s=total / rate_hz,
-                    share=total / n,
-                )
+            said = Finding.of(
+                FindingCode.STRETCHES_EXCLUDED, n_stretches=len(cuts), excluded_s=total / rate_hz, share=total / n
             )
-        findings += _motion(seen, rate_hz)
-        if heat is not None:
-            findings += _heated(seen, heat)
-        findings += _switching(seen, pool.map(lambda one: two_levels(one.column, rate_hz), seen))
+            findings.append(said)
+        findings += [*_motion(seen, rate_hz), *_heated(seen, heat), *_switching(seen, pool)]
         curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
-        axes = list(pool.map(lambda c: _identified(seen[c], range_degc, curve, c), range(channels)))
+        axes = list(pool.map(identified, range(channels)))
     return Noise(
         axes=tuple(axes),
         curve=curve,
         source=source,
         excluded_s=tuple((a / rate_hz, b / rate_hz) for a, b in cuts),
-        breaks_s=tuple(sorted({e.middle / rate_hz for one in seen for e in one.steps})),
+        breaks_s=tuple(sorted({at / rate_hz for one in seen for at in one.breaks})),
         findings=tuple(findings),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Undisturbed:
-    """One channel with excluded intervals as NaN, its own automatic ``cuts``, the ``steps`` of its level, findings."""
-
-    column: FloatArray
-    cuts: list[tuple[int, int]]
-    steps: list[Event]
-    findings: list[Finding]
+Bands = Callable[[FloatArray, float, Sequence[tuple[int, int]], Sequence[SlowChange]], list[Ordinates]]
+"""Spectral bands of readings or means (n,), their rate, the stretches between steps and the slow changes."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Screened:
-    """One channel with excluded intervals as NaN, the ``steps`` of its level, the ``choices`` of its slow changes, of
-    which the first are subtracted, and the share of these that the temperature explains."""
+class Channel:
+    """Readings of one channel, or means of them, ``column`` (n,), with its events and slow changes.
+
+    ``cuts`` are intervals to exclude, ``choices`` the slow changes that are stated (subtracted) and those that may be
+    there, ``share_of_heat`` that of the slow changes which the temperature explains.
+    """
 
     column: FloatArray
-    blank: NoiseAxis
-    steps: list[Event]
-    choices: list[Sequence[SlowChange]]
-    share_of_heat: float
+    rate_hz: float
+    name: str
+    unit: str
+    steps: Sequence[Event] = ()
+    cuts: Sequence[tuple[int, int]] = ()
+    findings: Sequence[Finding] = ()
+    choices: Sequence[Sequence[SlowChange]] = ((),)
+    share_of_heat: float = 0.0
+
+    @property
+    def breaks(self) -> list[float]:
+        """Middles of the steps, in readings."""
+        return [step.middle for step in self.steps]
 
     @property
     def is_heated(self) -> bool:
         """Whether the temperature is the larger part of its slow changes."""
         return self.share_of_heat > MOSTLY
+
+    def leave_out(self, stretches: Sequence[tuple[int, int]]) -> None:
+        """Mark the readings of ``stretches`` as missing."""
+        for start, stop in stretches:
+            self.column[start:stop] = np.nan
+
+    def without_events(self) -> Channel:
+        """The channel with its impacts and intervals of vibration, to be excluded, and its steps."""
+        steps, impacts = sudden_changes(self.column, self.rate_hz)
+        calm = replace(self, column=self.column.copy()) if impacts else self
+        calm.leave_out([(impact.start, impact.stop) for impact in impacts])
+        shocks = shaken(calm.column, self.rate_hz)
+        # Steps during shaking are part of it.
+        steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
+        findings = list(remarks.events(steps, impacts, shocks, self.rate_hz, self.unit))
+        cuts = merged([(e.start, e.stop) for e in (*shocks, *impacts)])
+        share = sum(stop - start for start, stop in cuts) / len(self.column)
+        if share > MOST_DISTURBED:
+            # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
+            findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
+            steps, cuts = [], []
+        return replace(self, steps=steps, cuts=cuts, findings=findings)
+
+    def without_changes(self, heat: FloatArray | None = None) -> Channel:
+        """The channel without its slow changes, or with the share of them that the temperature (n,) explains."""
+        share = 0.0 if heat is None else share_of_temperature(self.column, heat, self.breaks)
+        if share > MOSTLY:
+            return replace(self, share_of_heat=share)
+        choices = slow_changes(self.column, self.rate_hz, self.breaks)
+        column = without(self.column, choices[0], self.rate_hz)
+        findings = [*self.findings, *remarks.changes(choices[0], self.unit, heat)]
+        return replace(self, column=column, findings=findings, choices=choices, share_of_heat=share)
+
+    def blank(self) -> NoiseAxis:
+        """Its axis without terms."""
+        present = np.isfinite(self.column)
+        n = int(np.count_nonzero(present))
+        mean = float(np.sum(self.column, where=present)) / max(n, 1)
+        return blank_axis(self.name, self.unit, self.rate_hz, n, mean, readout(self.column))
+
+    def identified(
+        self,
+        bands_of: Bands,
+        blank: NoiseAxis,
+        curve: AllanCurve,
+        channel: int,
+        tails: float,
+        heat: FloatArray | None = None,
+    ) -> NoiseAxis:
+        """The ``blank`` axis with its terms, whose spectrum ``bands_of`` computes, and the findings of the channel."""
+        blank = replace(blank, findings=(*self.findings, *blank.findings))
+        if blank.sample_sigma == 0.0:
+            return blank
+        range_degc = remarks.UNLOGGED if heat is None else (float(np.min(heat)), float(np.max(heat)))
+        edges = np.array([0, *(at for step in self.steps for at in (step.start, step.stop)), len(self.column)])
+        stretches = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a >= SHORTEST_STRETCH]
+        beside = beside_each(self.column, self.choices, self.rate_hz)
+        choices = [bands_of(x, self.rate_hz, stretches, changes) for x, changes in beside]
+        axis = identify_axis(choices, blank, curve, channel, tails, range_degc)
+        # Drift that the temperature explains is stated with it.
+        others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)
+        return replace(axis, findings=others) if self.is_heated else axis
 
 
 def _heat(temperature: FloatArray, n: int) -> FloatArray | None:
@@ -194,29 +257,6 @@ def _heat(temperature: FloatArray, n: int) -> FloatArray | None:
         raise InputError(f"{n} readings need as many temperatures, got {' x '.join(map(str, temperature.shape))}")
     there = np.flatnonzero(np.isfinite(temperature[:, 0]))
     return np.interp(np.arange(n), there, temperature[there, 0]) if len(there) else None
-
-
-def _leave_out(column: FloatArray, stretches: Sequence[tuple[int, int]]) -> None:
-    for start, stop in stretches:
-        column[start:stop] = np.nan
-
-
-def _without_events(column: FloatArray, rate_hz: float, unit: str) -> _Undisturbed:
-    """A channel's impacts and intervals of vibration, to be excluded, and its steps."""
-    steps, impacts = sudden_changes(column, rate_hz)
-    calm = column.copy() if impacts else column
-    _leave_out(calm, [(impact.start, impact.stop) for impact in impacts])
-    shocks = shaken(calm, rate_hz)
-    # Steps during shaking are part of it.
-    steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
-    findings = list(remarks.events(steps, impacts, shocks, rate_hz, unit))
-    cuts = merged([(e.start, e.stop) for e in (*shocks, *impacts)])
-    share = sum(stop - start for start, stop in cuts) / len(column)
-    if share > MOST_DISTURBED:
-        # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
-        findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
-        steps, cuts = [], []
-    return _Undisturbed(column, cuts, steps, findings)
 
 
 def sudden_changes(column: FloatArray, rate_hz: float) -> tuple[list[Event], list[Event]]:
@@ -230,28 +270,9 @@ def sudden_changes(column: FloatArray, rate_hz: float) -> tuple[list[Event], lis
     return events
 
 
-def _screen(
-    quiet: _Undisturbed, rate_hz: float, named: tuple[str, str], heat: FloatArray | None, *, automatic: bool
-) -> _Screened:
-    """A channel, ``named`` by its name and unit, beside the logged temperature (n,)."""
-    name, unit = named
-    column, steps, findings = quiet.column, quiet.steps, quiet.findings
-    share = 0.0 if heat is None else share_of_temperature(column, heat, [e.middle for e in steps])
-    choices: list[Sequence[SlowChange]] = [()]
-    if automatic and share <= MOSTLY:
-        choices = slow_changes(column, rate_hz, [e.middle for e in steps])
-        column = without(column, choices[0], rate_hz)
-        findings = [*findings, *remarks.changes(choices[0], unit, heat)]
-    present = np.isfinite(column)
-    n = int(np.count_nonzero(present))
-    mean = float(np.sum(column, where=present)) / max(n, 1)
-    blank = blank_axis(name, unit, rate_hz, n, mean, readout(column))
-    return _Screened(column, replace(blank, findings=(*findings, *blank.findings)), steps, choices, share)
-
-
-def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
+def _motion(seen: Sequence[Channel], rate_hz: float) -> list[Finding]:
     """Finding for a log that is not static, by the accelerometer's readings outside excluded intervals."""
-    triad = [one.column for one in seen if one.blank.name in ACCELEROMETER]
+    triad = [one.column for one in seen if one.name in ACCELEROMETER]
     if len(triad) < len(ACCELEROMETER):
         return []
     force = np.column_stack(triad)
@@ -269,10 +290,10 @@ def _motion(seen: Sequence[_Screened], rate_hz: float) -> list[Finding]:
     return [said]
 
 
-def _heated(seen: Sequence[_Screened], heat: FloatArray) -> list[Finding]:
+def _heated(seen: Sequence[Channel], heat: FloatArray | None) -> list[Finding]:
     """Finding for axes whose slow changes are mostly those of the temperature (n,)."""
-    axes = [one.blank.name for one in seen if one.is_heated]
-    if not axes:
+    axes = [one.name for one in seen if one.is_heated]
+    if heat is None or not axes:
         return []
     used = heat[np.isfinite([one.column for one in seen]).any(axis=0)]
     share = max(one.share_of_heat for one in seen)
@@ -282,26 +303,15 @@ def _heated(seen: Sequence[_Screened], heat: FloatArray) -> list[Finding]:
     return [said]
 
 
-def _switching(seen: Sequence[_Screened], found: Iterable[TwoLevels | None]) -> list[Finding]:
+def _switching(seen: Sequence[Channel], pool: ThreadPoolExecutor) -> list[Finding]:
     """Finding for axes whose level switches between two values."""
+    found = pool.map(lambda one: two_levels(one.column, one.rate_hz), seen)
     axes = [
-        (one.blank.name, levels.size, one.blank.unit, levels.n_switches, levels.held_s)
+        (one.name, levels.size, one.unit, levels.n_switches, levels.held_s)
         for one, levels in zip(seen, found, strict=True)
         if levels is not None
     ]
     return [Finding.of(FindingCode.TWO_LEVELS, axes=axes)] if axes else []
-
-
-def _identified(seen: _Screened, range_degc: tuple[float, float], curve: AllanCurve, channel: int) -> NoiseAxis:
-    if seen.blank.sample_sigma == 0.0:
-        return seen.blank
-    stretches, rate_hz = stretches_between(len(seen.column), seen.steps), seen.blank.rate_hz
-    beside = beside_each(seen.column, seen.choices, rate_hz)
-    choices = [ordinates(x, rate_hz, stretches, changes) for x, changes in beside]
-    axis = identify_axis(choices, seen.blank, curve, channel, tail_error(seen.column), range_degc)
-    # Drift that the temperature explains is stated with it.
-    others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)
-    return replace(axis, findings=others) if seen.is_heated else axis
 
 
 def _checked_stretch(stretch: tuple[float, float], n: int, rate_hz: float) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -133,8 +133,7 @@ def white_limit(
         highest /= np.sqrt(2.0)
     whole = binned(bands, nyquist_hz, masked)
     top = whole.frequency_hz > 0.9 * nyquist_hz
-    expected = whole.expectation(spectrum.fit.strength)
-    return highest, float(np.mean(whole.power[top] / expected[top])) if top.any() else math.nan
+    return highest, float(np.mean(whole.ratio(spectrum.fit)[top])) if top.any() else math.nan
 
 
 def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
@@ -142,9 +141,8 @@ def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
     low = spectrum.frequency_hz <= highest_hz / 4.0
     if np.count_nonzero(low) < 8:
         return False
-    below = BinnedSpectrum(*(getattr(spectrum, one.name)[..., low] for one in fields(spectrum)))
-    fit = below.likelihood.fit((1, 2, 3))
-    ratio = spectrum.without_columns(fit.columns) / spectrum.expectation(fit.strength)
+    below = spectrum.below(highest_hz / 4.0)
+    ratio = spectrum.ratio(below.likelihood.fit((1, 2, 3)))
     # The level below is a median of bins, robust to a resonance there.
     level = float(np.median(ratio[low & (spectrum.frequency_hz > highest_hz / 32.0)]))
     top = spectrum.frequency_hz > highest_hz / 2.0 ** (1 / 3)
@@ -156,10 +154,9 @@ def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
 
 
 def _deviates(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
-    expected = spectrum.expectation(spectrum.fit.strength)
     upper = spectrum.frequency_hz > highest_hz / 4.0
     key = np.floor(3.0 * np.log2(highest_hz / spectrum.frequency_hz[upper]) + 1e-9).astype(np.int64)
-    count, ratio = spectrum.count[upper], (spectrum.without_columns(spectrum.fit.columns) / expected)[upper]
+    count, ratio = spectrum.count[upper], spectrum.ratio()[upper]
     n = np.maximum(np.bincount(key, count), TINY)
     mean = np.bincount(key, count * ratio) / n
     return bool(np.any((n >= 8) & (np.abs(mean - 1.0) > np.maximum(TOLERANCE, 4.5 * np.sqrt(2.0 / n)))))

@@ -78,6 +78,12 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
     )
 
 
+def unexplained(deviation: float, frequency_hz: float) -> Finding:
+    """Finding for a part of the spectrum that the terms do not explain."""
+    tau_s = 0.5 / frequency_hz
+    return Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=deviation, frequency_hz=frequency_hz, tau_s=tau_s)
+
+
 def changes(found: Sequence[SlowChange], unit: str, heat: FloatArray | None = None) -> Iterator[Finding]:
     """Findings for the exponentials of a warm-up, beside the logged temperature ``heat``, and for waves."""
     low_degc, high_degc = UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))

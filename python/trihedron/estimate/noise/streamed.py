@@ -18,11 +18,11 @@ from trihedron.estimate.noise.allan import (
     curve_with_intervals,
     default_clusters,
 )
-from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
-from trihedron.estimate.noise.identify import sudden_changes
+from trihedron.estimate.noise.axis import blank_axis
+from trihedron.estimate.noise.identify import Channel, sudden_changes
 from trihedron.estimate.noise.screening import readout, tail_error
-from trihedron.estimate.noise.slow_changes import beside_each, slow_changes, without
-from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
+from trihedron.estimate.noise.slow_changes import SlowChange
+from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, Ordinates, ordinates_of_means
 from trihedron.records import AllanCurve, Noise, NoiseAxis
 
 Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
@@ -104,19 +104,18 @@ def _stream_of(channels: int, sizes: Sequence[int], budget_bytes: int) -> _core.
     return _core.AllanStream(channels, sizes, max(budget_bytes // (8 * channels), _core.AllanStream.LEAST_BUDGET))
 
 
-def _axis(stream: _core.AllanStream, channel: int, mean: float, head: FloatArray, curve: AllanCurve) -> NoiseAxis:
-    name, unit, rate_hz, n = curve.names[channel], curve.units[channel], curve.rate_hz, curve.n_samples
-    blank = blank_axis(name, unit, rate_hz, n, mean, readout(head))
-    if blank.sample_sigma == 0.0:
-        return blank
-    means, size = stream.means(channel, -(-n // LONGEST_TRANSFORM))
-    rate_of_means = rate_hz / size
-    steps, _ = sudden_changes(means, rate_of_means)
-    choices = slow_changes(means, rate_of_means, [e.middle for e in steps])
-    means = without(means, choices[0], rate_of_means)
-    events = remarks.events(steps, [], [], rate_of_means, unit)
-    blank = replace(blank, findings=(*events, *remarks.changes(choices[0], unit), *blank.findings))
-    stretches = stretches_between(len(means), steps)
-    beside = beside_each(means, choices, rate_of_means)
-    bands = [ordinates_of_means((x, rate_hz), size, stretches, head, changes) for x, changes in beside]
-    return identify_axis(bands, blank, curve, channel, tail_error(head))
+def _axis(stream: _core.AllanStream, c: int, mean: float, head: FloatArray, curve: AllanCurve) -> NoiseAxis:
+    rate_hz, n = curve.rate_hz, curve.n_samples
+    blank = blank_axis(curve.names[c], curve.units[c], rate_hz, n, mean, readout(head))
+    means, size = stream.means(c, -(-n // LONGEST_TRANSFORM))
+    channel = Channel(means, rate_hz / size, blank.name, blank.unit)
+    steps, _ = sudden_changes(means, channel.rate_hz)
+    findings = list(remarks.events(steps, [], [], channel.rate_hz, blank.unit))
+    channel = replace(channel, steps=steps, findings=findings).without_changes()
+
+    def bands(
+        x: FloatArray, _: float, stretches: Sequence[tuple[int, int]], changes: Sequence[SlowChange]
+    ) -> list[Ordinates]:
+        return ordinates_of_means((x, rate_hz), size, stretches, head, changes)
+
+    return channel.identified(bands, blank, curve, c, tail_error(head))

@@ -109,13 +109,9 @@ _SPECTRUM = {
         "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
     ),
     (Code.SPECTRUM_UNEXPLAINED, "", WARNING): Words(
-        "Near {frequency_hz:.2g} Hz the spectrum lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
+        "Near {frequency_hz:.2g} Hz (means of {tau_s:.2g} s) the power lies {deviation:abs .0f %} "
+        "{deviation:<below|above} the fitted terms.",
         "disturbance that is not noise (temperature, daily life of the building), or noise of another shape.",
-        _WIDENED,
-    ),
-    (Code.SPECTRUM_UNEXPLAINED, "curve", WARNING): Words(
-        "Near {tau_s:.2g} s the curve lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
-        "a periodic disturbance, temperature, or noise of another shape.",
         _WIDENED,
     ),
 }
@@ -126,11 +122,6 @@ _TERMS = {
         "",
         "Jumps, impacts, spectral lines and gaps cannot be separated from noise in a curve; use the log if there "
         "is one.",
-    ),
-    (Code.RAMP_OR_WALK, "", WARNING): Words(
-        "R and K are hard to separate in a curve: a random walk that happened to go one way has the curve of a ramp.",
-        "the curve keeps the squares of differences and loses their order.",
-        "Identify from the log where there is one.",
     ),
     (Code.SLOW_NOISE_UNRESOLVED, "", NOTE): Words(
         "Slow noise is there; B and K are not separable here: B at least "
