@@ -37,15 +37,12 @@ def test_sessions_of_one_unit_are_not_told_apart_and_the_walk_is_inside_its_inte
         for seed in range(2):
             found = compare_slow(session([k, seed], walk), session([k, 50 + seed], walk, scatter=1e-3))
             p.append(found.p_value)
-            inside += [
-                axis["K"].lower <= true <= axis["K"].upper
-                for side in (found.first, found.second)
-                for axis, true in zip(side, np.broadcast_to(walk, 3), strict=True)
-            ]
+            true = np.sqrt(np.mean(np.square(walk)))
+            inside += [side["K"].lower <= true <= side["K"].upper for (side,) in (found.first, found.second)]
     # Eight pairs of one unit: two below 1 % happen in 0.3 %.
     assert np.sum(np.array(p) < 0.01) <= 1
-    # 95 % of 48 figures (those of a session hang together a little): fewer than 41 happen in 1 %.
-    assert sum(inside) >= 41
+    # 95 % of 16 figures: fewer than 13 happen in 0.7 %.
+    assert sum(inside) >= 13
 
 
 @pytest.mark.parametrize(("pairs", "least", "most"), [(3, 2, 0), pytest.param(5, 3, 1, marks=pytest.mark.slow)])
@@ -65,7 +62,7 @@ def test_figures_do_not_hang_on_how_the_accelerometer_was_calibrated():
     x, y, z = one.up.T
     moved = replace(one, values=one.values + 0.03 * x - 0.02 * y + 0.01 * z * z + 0.005 * x * y)
     first, second = compare_slow([one], other), compare_slow([moved], other)
-    assert first.first[2]["K"].value == pytest.approx(second.first[2]["K"].value, rel=1e-6)
+    assert first.first[0]["K"].value == pytest.approx(second.first[0]["K"].value, rel=1e-6)
     assert first.p_value == pytest.approx(second.p_value, rel=1e-6)
 
 

@@ -77,9 +77,10 @@ Side = tuple[Diagnosis, Recording, Segments]
 
 
 def slow_noise(model: Side, recording: Side, *, alpha: float) -> tuple[NoiseDifference, ...]:
-    """B and K of both sensors, axis by axis, where both logs have enough poses.
+    """B and K of both sensors where both logs have enough poses.
 
-    For the gyro from the biases of poses, for the accelerometer from their part along gravity. Significant where the
+    For the gyro from the biases of poses, axis by axis; for the accelerometer from their part along gravity, for all
+    axes together. Significant where the
     p-value is below ``alpha``/24 and the ratio beyond a factor of two; never where a drift of the recording was named
     as an effect, or disagrees without one: a walk would then describe the same drift twice.
     """
@@ -103,12 +104,13 @@ def _rows(
     differs = not is_open and found.p_value < alpha / OF_ALPHA and max(common, 1.0 / common) > LEAST_SLOW_RATIO
     out = []
     terms: tuple[NoiseTerm, NoiseTerm] = ("B", "K")
+    axes = AXES if len(found.ratio) == len(AXES) else ("",)
     for term in terms:
         unit = UNIT[sensor] + ("" if term == "B" else "/sqrt(s)")
         is_it = differs and term == found.term
         remark = _remark(sensor, found, common, rate_hz) if is_it else ""
-        for k, axis in enumerate(AXES):
-            m, r, ratio = found.first[k][term], found.second[k][term], found.ratio[k][term]
+        for axis, of_m, of_r, ratios in zip(axes, found.first, found.second, found.ratio, strict=True):
+            m, r, ratio = of_m[term], of_r[term], ratios[term]
             is_shown = m.lower > 0.0 and r.lower > 0.0
             out.append(
                 NoiseDifference(

@@ -11,10 +11,10 @@ x²/2 ln|x| - 3x²/4 (1/f noise of two-sided density B²/2πf has no variance, o
 absorbed by the free mean). A pose shows one component of an accelerometer's bias, along gravity. With ``u`` (n, 3) the
 directions of gravity the norm residuals have
 
-    V = σ² + s² I + Σ_k (u_k u_kᵀ) ∘ (B_k² V_B + K_k² V_K)
+    V = σ² + s² I + (u uᵀ) ∘ (B² V_B + K² V_K)
 
-The likelihood is restricted to contrasts that the calibration does not absorb; all strengths and ``s`` are integrated
-jointly over a low-discrepancy sequence, because the axes are correlated. docs/noise.md, section 9.
+The likelihood is restricted to contrasts that the calibration does not absorb, and tabulated over B, K, common to the
+axes, and s. docs/noise.md, section 9.
 """
 
 from __future__ import annotations
@@ -42,8 +42,6 @@ LEAST_SIDE = 0.02
 value gives no more information."""
 MIDDLE_OF_WALK = 6.0
 """The mean square of a random walk about its mean over a span is K² span/6."""
-DRAWS = {1: 4096, 3: 8192}
-"""Points over the strengths of so many axes and s: some hundred share the weight for a session of 30 poses."""
 ABSENT = 0.1
 """Prior probability that a strength is zero."""
 SHOWN = 0.1
@@ -90,7 +88,7 @@ class PoseBiases:
 class SlowDifference:
     """Slow noise of two sessions: p-value of the difference, and the ``term`` that differs most.
 
-    ``first``, ``second``: B and K of either session per axis; ``ratio``: B and K per axis, first over second.
+    ``first``, ``second``: B and K of either session, of each axis or of all together; ``ratio``: first over second.
     """
 
     p_value: float
@@ -105,35 +103,29 @@ def compare_slow(first: Sequence[PoseBiases], second: Sequence[PoseBiases]) -> S
 
     Twice the gain in log-likelihood of separate B and K per session over common ones (one B and one K for all axes of
     norm residuals) is tested by χ² with two degrees of freedom per entry; the term whose separate values alone gain
-    more is reported. Values and ratios are per axis.
+    more is reported.
     """
     if min(z.basis.shape[1] for z in (*first, *second)) < FEWEST_CONTRASTS:
         return None
     won, by_b, by_k = 0.0, 0.0, 0.0
-    drawn: list[tuple[_Drawn, _Drawn]] = []
+    found: list[tuple[_Strengths, _Strengths]] = []
     for one, other in zip(first, second, strict=True):
-        sides = tuple(_free_of_calibration(z) for z in (one, other))
+        sides = tuple(replace(z, values=z.basis @ (z.basis.T @ z.values)) for z in (one, other))
         least = LEAST_SIDE * max(z.spread for z in sides)
         b = _levels([max(z.spread, least) for z in sides])
         k = _levels([max(z.spread, least) / math.sqrt(z.span_s / MIDDLE_OF_WALK) for z in sides])
-        parts = [_Parts.of(z, least) for z in sides]
-        p, q = (_log_likelihood(of, b, k) for of in parts)
+        pair = tuple(_Strengths(b, k, _log_likelihood(z, b, k, least)) for z in sides)
+        p, q = (side.table.max(axis=2) for side in pair)
         together = float((p + q).max())
         won += float(p.max() + q.max()) - together
         # B separate and K common; then K separate and B common.
         by_b += float((p.max(axis=0) + q.max(axis=0)).max()) - together
         by_k += float((p.max(axis=1) + q.max(axis=1)).max()) - together
-        drawn.append((_Drawn.of(parts[0], b, k), _Drawn.of(parts[1], b, k)))
+        found.append((pair[0], pair[1]))
     p_value = chdtrc(2.0 * len(first), 2.0 * won)
-    sides_terms = [tuple(term for pair in drawn for term in pair[j].terms()) for j in (0, 1)]
-    ratios = tuple(_ratios(*pair, axis) for pair in drawn for axis in range(pair[0].B.shape[1]))
-    return SlowDifference(p_value, "B" if by_b > by_k else "K", sides_terms[0], sides_terms[1], ratios)
-
-
-def _free_of_calibration(one: PoseBiases) -> PoseBiases:
-    """The biases projected on their contrasts: the part that a calibration absorbs is removed."""
-    basis = one.basis
-    return replace(one, values=basis @ (basis.T @ one.values))
+    terms = [tuple({name: side[j].measured(name) for name in ("B", "K")} for side in found) for j in (0, 1)]
+    ratios = tuple({name: one.over(other, name) for name in ("B", "K")} for one, other in found)
+    return SlowDifference(p_value, "B" if by_b > by_k else "K", terms[0], terms[1], ratios)
 
 
 def _levels(sizes: Sequence[float]) -> FloatArray:
@@ -143,102 +135,59 @@ def _levels(sizes: Sequence[float]) -> FloatArray:
     return np.concatenate([[0.0], np.geomspace(low, high, n)])
 
 
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """Contrasts (m,), their white covariance (m, m), covariances (axes, m, m) per B² and per K², rms ``spread``."""
+def _log_likelihood(one: PoseBiases, b: FloatArray, k: FloatArray, least: float) -> FloatArray:
+    """(b, k, s) restricted log-likelihood of strengths common to all axes, and of scatters from 0 to 1.5 of the spread.
 
-    contrasts: FloatArray
-    white: FloatArray
-    of_b: FloatArray
-    of_k: FloatArray
-    spread: float
-
-    @classmethod
-    def of(cls, one: PoseBiases, least: float) -> _Parts:
-        """Parts of a session; ``LOWEST`` times ``least`` is added to its white noise in squares."""
-        basis, up = one.basis, np.ones((len(one.values), 1)) if one.up is None else one.up
-        gram = np.einsum("ik,jk->kij", up, up)
-        of_b, of_k = (basis.T @ (gram * kernel) @ basis for kernel in _kernels(one))
-        white = basis.T @ np.diag(one.sigma**2 + (LOWEST * least) ** 2) @ basis
-        return cls(basis.T @ one.values, white, of_b, of_k, one.spread)
-
-    def log_likelihood(self, V: FloatArray) -> FloatArray:
-        """(...,) restricted log-likelihood of covariances (..., m, m) of the contrasts."""
-        half = np.linalg.cholesky(V)
-        left = np.linalg.solve(half, np.broadcast_to(self.contrasts[:, None], (*V.shape[:-1], 1)))[..., 0]
-        log_det = 2.0 * np.log(np.einsum("...ii->...i", half)).sum(axis=-1)
-        return np.asarray(-0.5 * (log_det + (left**2).sum(axis=-1)))
-
-
-def _log_likelihood(parts: _Parts, b: FloatArray, k: FloatArray) -> FloatArray:
-    """(b, k) log-likelihood of strengths common to all axes, at the best ``s`` for each."""
-    s = np.concatenate([[0.0], np.geomspace(0.15, 1.5, 5) * parts.spread])
-    scatter = (s**2)[:, None, None] * np.eye(len(parts.contrasts))
-    of_k = (k**2)[:, None, None, None] * parts.of_k.sum(axis=0) + parts.white + scatter
-    of_b = parts.of_b.sum(axis=0)
-    return np.array([parts.log_likelihood(of_k + strength**2 * of_b).max(axis=1) for strength in b])
+    ``LOWEST`` times ``least`` is added to the white noise in squares.
+    """
+    basis, m = one.basis, one.basis.shape[1]
+    gram = 1.0 if one.up is None else one.up @ one.up.T
+    of_b, of_k = (basis.T @ (gram * kernel) @ basis for kernel in _kernels(one))
+    white = basis.T @ np.diag(one.sigma**2 + (LOWEST * least) ** 2) @ basis
+    s = np.concatenate([[0.0], np.geomspace(0.15, 1.5, 5) * one.spread])
+    rest = (k**2)[:, None, None, None] * of_k + white + (s**2)[:, None, None] * np.eye(m)
+    contrasts, out = basis.T @ one.values, []
+    for strength in b:
+        half = np.linalg.cholesky(rest + strength**2 * of_b)
+        left = np.linalg.solve(half, np.broadcast_to(contrasts[:, None], (*half.shape[:-1], 1)))[..., 0]
+        out.append(-np.log(np.einsum("...ii->...i", half)).sum(axis=-1) - 0.5 * (left**2).sum(axis=-1))
+    return np.array(out)
 
 
 @dataclass(frozen=True, eq=False)
-class _Drawn:
-    """Strengths (draws, axes) of B and of K with their posterior weights (draws,)."""
+class _Strengths:
+    """Levels of B and of K, zero first, with the ``table`` (b, k, s) of the log-likelihood."""
 
     B: FloatArray
     K: FloatArray
-    weight: FloatArray
+    table: FloatArray
 
-    @classmethod
-    def of(cls, parts: _Parts, b: FloatArray, k: FloatArray) -> _Drawn:
-        """Draws within the levels ``b``, ``k``: prior flat in the logarithm, with a share of the points at zero."""
-        from scipy.stats import qmc  # imported here: the import takes longer than most noise analyses
+    def weights(self, name: str) -> FloatArray:
+        """Posterior weight of every level: prior flat in the logarithm, with ``ABSENT`` at zero."""
+        weight = np.exp(self.table - self.table.max())
+        for axis, n in enumerate(weight.shape):
+            prior = np.r_[ABSENT, np.full(n - 1, (1.0 - ABSENT) / (n - 1))]
+            weight = weight * prior.reshape([-1 if axis == k else 1 for k in range(3)])
+        of_levels = weight.sum(axis=(1, 2) if name == "B" else (0, 2))
+        return np.asarray(of_levels / of_levels.sum())
 
-        axes = len(parts.of_b)
-        u = qmc.Sobol(2 * axes + 1, seed=0).random(DRAWS[axes])
-        depth, there = (u - ABSENT) / (1.0 - ABSENT), u >= ABSENT
-        highest = np.r_[np.full(axes, b[-1]), np.full(axes, k[-1]), HIGHEST / 4.0 * parts.spread]
-        part = np.exp(-np.log(b[-1] / b[1]) * depth) * there
-        B, K, s = np.split(highest * part, [axes, 2 * axes], axis=1)
-        V = parts.white + np.einsum("dk,kab->dab", B**2, parts.of_b) + np.einsum("dk,kab->dab", K**2, parts.of_k)
-        log_weight = parts.log_likelihood(V + (s**2)[:, :, None] * np.eye(len(parts.contrasts)))
-        weight = np.exp(log_weight - log_weight.max())
-        return cls(B, K, weight / weight.sum())
+    def quantiles(self, name: str, places: FloatArray) -> FloatArray:
+        """(k,) quantiles of the logarithm of a term that is not zero, between the levels by interpolation."""
+        reached = np.cumsum(self.weights(name)[1:])
+        return np.asarray(np.interp(places * reached[-1], reached, np.log(getattr(self, name)[1:])))
 
-    def terms(self) -> tuple[dict[str, Measured], ...]:
-        """B and K of every axis: median and 95 % interval, which starts at zero where the term may be absent."""
-        return tuple(
-            {name: _measured(of, self.weight) for name, of in (("B", b), ("K", k))}
-            for b, k in zip(self.B.T, self.K.T, strict=True)
-        )
+    def measured(self, name: str) -> Measured:
+        """Median and 95 % interval of a term, which starts at zero where it may be absent."""
+        absent = float(self.weights(name)[0])
+        low, middle, high = np.exp(self.quantiles(name, np.maximum(INTERVAL - absent, 0.0) / (1.0 - absent))).tolist()
+        is_there = absent / (1.0 - absent) < SHOWN * ABSENT / (1.0 - ABSENT)
+        return Measured(middle if absent < 0.5 else 0.0, low if is_there else 0.0, high, math.log(high / low) / 3.92)
 
-
-def _quantiles(values: FloatArray, weight: FloatArray, places: FloatArray) -> FloatArray:
-    """Weighted quantiles (k,) of ``values`` at ``places`` (k,)."""
-    order = np.argsort(values)
-    reached = np.cumsum(weight[order]) / max(float(weight.sum()), TINY)
-    return values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
-
-
-def _measured(values: FloatArray, weight: FloatArray) -> Measured:
-    low, middle, high = _quantiles(values, weight, INTERVAL).tolist()
-    of_absent = float(weight[values == 0.0].sum())
-    is_there = of_absent / max(1.0 - of_absent, TINY) < SHOWN * ABSENT / (1.0 - ABSENT)
-    sigma = math.log(high / max(low, LOWEST * high)) / 3.92 if high > 0.0 else 0.0
-    return Measured(middle, low if is_there else 0.0, high, sigma)
-
-
-def _ratios(first: _Drawn, second: _Drawn, axis: int) -> dict[str, Ratio]:
-    """Ratios first over second, from all pairs of quantiles of both posteriors."""
-    out = {}
-    places = (np.arange(200) + 0.5) / 200
-    for name in ("B", "K"):
-        logs = []
-        for one in (first, second):
-            values = getattr(one, name)[:, axis]
-            there = values > 0.0
-            logs.append(np.log(_quantiles(values[there], one.weight[there], places)))
-        low, middle, high = np.exp(np.quantile(np.subtract.outer(*logs), INTERVAL))
-        out[name] = Ratio(float(middle), float(low), float(high), 1.0)
-    return out
+    def over(self, other: _Strengths, name: str) -> Ratio:
+        """The ratio of a term to that of another session, from all pairs of quantiles of both."""
+        logs = [one.quantiles(name, (np.arange(200) + 0.5) / 200) for one in (self, other)]
+        low, middle, high = np.exp(np.quantile(np.subtract.outer(*logs), INTERVAL)).tolist()
+        return Ratio(middle, low, high, 1.0)
 
 
 def _kernels(biases: PoseBiases) -> tuple[FloatArray, FloatArray]:
