@@ -28,6 +28,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
+from trihedron.channel_facts.low_pass import RISE
 from trihedron.probability import chdtrc, chdtri
 from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise, Ratio
 
@@ -42,10 +43,6 @@ LEAST_SIDE = 0.02
 value gives no more information."""
 MIDDLE_OF_WALK = 6.0
 """The mean square of a random walk about its mean over a span is K² span/6."""
-ABSENT = 0.1
-"""Prior probability that a strength is zero."""
-SHOWN = 0.1
-"""A strength is present where the odds of its absence fall to a tenth (Jeffreys' strong evidence)."""
 INTERVAL = np.array([0.025, 0.5, 0.975])
 """Ends of a 95 % interval and the median between."""
 
@@ -162,30 +159,28 @@ class _Strengths:
     K: FloatArray
     table: FloatArray
 
-    def weights(self, name: str) -> FloatArray:
-        """Posterior weight of every level: prior flat in the logarithm, with ``ABSENT`` at zero."""
-        weight = np.exp(self.table - self.table.max())
-        for axis, n in enumerate(weight.shape):
-            prior = np.r_[ABSENT, np.full(n - 1, (1.0 - ABSENT) / (n - 1))]
-            weight = weight * prior.reshape([-1 if axis == k else 1 for k in range(3)])
-        of_levels = weight.sum(axis=(1, 2) if name == "B" else (0, 2))
-        return np.asarray(of_levels / of_levels.sum())
+    def rise(self, name: str) -> FloatArray:
+        """Rise of the deviance at every level of a term, the other strengths refitted."""
+        return np.asarray(2.0 * (self.table.max() - self.table.max(axis=(1, 2) if name == "B" else (0, 2))))
 
     def quantiles(self, name: str, places: FloatArray) -> FloatArray:
-        """(k,) quantiles of the logarithm of a term that is not zero, between the levels by interpolation."""
-        reached = np.cumsum(self.weights(name)[1:])
-        return np.asarray(np.interp(places * reached[-1], reached, np.log(getattr(self, name)[1:])))
+        """(k,) quantiles of a term by the weight exp(-rise/2) of its sizes."""
+        levels, weight = getattr(self, name), np.exp(-0.5 * self.rise(name))
+        reached = np.r_[0.0, np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(levels))]
+        return np.asarray(np.interp(places * reached[-1], reached, levels))
 
     def measured(self, name: str) -> Measured:
-        """Median and 95 % interval of a term, which starts at zero where it may be absent."""
-        absent = float(self.weights(name)[0])
-        low, middle, high = np.exp(self.quantiles(name, np.maximum(INTERVAL - absent, 0.0) / (1.0 - absent))).tolist()
-        is_there = absent / (1.0 - absent) < SHOWN * ABSENT / (1.0 - ABSENT)
-        return Measured(middle if absent < 0.5 else 0.0, low if is_there else 0.0, high, math.log(high / low) / 3.92)
+        """Median of the weights and 95 % interval of a term, which starts at zero where it may be absent."""
+        levels, root = getattr(self, name), np.sqrt(self.rise(name))
+        best, end = int(root.argmin()), math.sqrt(RISE)
+        high = float(np.interp(end, np.maximum.accumulate(root[best:]), levels[best:]))
+        low = float(np.interp(-end, -np.maximum.accumulate(root[best::-1])[::-1], levels[: best + 1]))
+        (middle,) = self.quantiles(name, np.array([0.5])).tolist()
+        return Measured(middle, low, high, math.log(high / max(low, LOWEST * high)) / 3.92)
 
     def over(self, other: _Strengths, name: str) -> Ratio:
         """The ratio of a term to that of another session, from all pairs of quantiles of both."""
-        logs = [one.quantiles(name, (np.arange(200) + 0.5) / 200) for one in (self, other)]
+        logs = [np.log(one.quantiles(name, (np.arange(200) + 0.5) / 200)) for one in (self, other)]
         low, middle, high = np.exp(np.quantile(np.subtract.outer(*logs), INTERVAL)).tolist()
         return Ratio(middle, low, high, 1.0)
 
