@@ -82,36 +82,32 @@ def allan_deviation(
     if isinstance(names, str) or isinstance(units, str):
         raise InputError("names and units are lists, one text for each channel.")
     readings = as_readings(x)
-    n = len(readings)
     check_question(rate_hz, kind, confidence)
-    if n < _LONGEST[kind]:
-        raise InputError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
-    sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
-    variance, terms, weight = _core.allan_variance(readings, sizes, KINDS[kind])
-    for c in range(len(variance)):
-        variance[c] *= true_share(readings[:, c], np.array(sizes), variance[c], 3 if kind == "hadamard" else 2)
-    curve = curve_with_intervals(
-        kind, rate_hz, n, np.array(sizes), variance.T, terms.T, weight.T, confidence, tuple(names), tuple(units)
-    )
+    if len(readings) < _LONGEST[kind]:
+        raise InputError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {len(readings)}")
+    curve = curve_of([readings], rate_hz, clusters, tuple(names), tuple(units), kind, confidence)
     return curve.of_one_series() if np.ndim(x) == 1 else curve
 
 
-def curve_of_columns(
-    columns: Sequence[FloatArray],
+def curve_of(
+    parts: Sequence[FloatArray],
     rate_hz: float,
-    clusters: Sequence[int] | None,
+    clusters: Sequence[int] | IntArray | None,
     names: tuple[str, ...],
     units: tuple[str, ...],
+    kind: AllanKind = "overlapping",
+    confidence: float = 0.95,
 ) -> AllanCurve:
-    """Overlapping curve of channels (n,) in separate arrays."""
-    n = len(columns[0])
-    sizes = default_clusters(n) if clusters is None else checked_clusters(clusters)
-    found = [_core.allan_variance(column[:, np.newaxis], sizes, KINDS["overlapping"]) for column in columns]
+    """Curve of the channels of ``parts``, arrays (n, channels) each."""
+    n = len(parts[0])
+    sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
+    found = [_core.allan_variance(part, sizes, KINDS[kind]) for part in parts]
     variance, terms, weight = (np.concatenate([one[k] for one in found]).T for k in range(3))
-    shares = [true_share(column, np.array(sizes), variance[:, c]) for c, column in enumerate(columns)]
-    variance = variance * np.stack(shares, axis=1)
+    order = 3 if kind == "hadamard" else 2
+    for c, column in enumerate(column for part in parts for column in part.T):
+        variance[:, c] *= true_share(column, np.array(sizes), variance[:, c], order)
     return curve_with_intervals(
-        "overlapping", rate_hz, n, np.array(sizes), variance, terms.astype(np.int64), weight, 0.95, names, units
+        kind, rate_hz, n, np.array(sizes), variance, terms.astype(np.int64), weight, confidence, names, units
     )
 
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.noise import remarks
-from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
+from trihedron.estimate.noise.allan import as_readings, check_question, curve_of
 from trihedron.estimate.noise.axis import blank_axis, identify_axis
 from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import (
@@ -144,7 +144,7 @@ def identify_noise(
             )
             findings.append(said)
         findings += [*_motion(seen, rate_hz), *_heated(seen, heat), *_switching(seen, pool)]
-        curve = curve_of_columns([one.column for one in seen], rate_hz, clusters, names, units)
+        curve = curve_of([one.column[:, np.newaxis] for one in seen], rate_hz, clusters, names, units)
         axes = list(pool.map(identified, range(channels)))
     return Noise(
         axes=tuple(axes),
