@@ -338,6 +338,17 @@ def test_a_wave_of_few_periods_and_a_level_that_switches_are_named_and_no_walk_i
         assert "K" not in present(found.axes[0])
 
 
+def test_a_wave_of_little_more_than_a_period_is_one_change_of_its_size():
+    n, rate_hz = 36_000, 1.0
+    x = np.random.default_rng(1).normal(0.0, 0.01, n) + 0.02 * np.sin(2.0 * np.pi * np.arange(n) / 28_800.0 + 1.0)
+    (axis,) = identify_noise(x, rate_hz).axes
+    (wave,) = [finding.numbers for finding in axis.findings if FindingCode.LOG_DRIFT is finding.code]
+    # One and a quarter periods, whose ends a straight line may take: an eighth of either.
+    assert wave["amplitude"] == pytest.approx(0.02, rel=0.125)
+    assert wave["period_s"] == pytest.approx(28_800.0, rel=0.125)
+    assert present(axis) == {"N"}
+
+
 def test_a_steady_drift_of_a_hundred_times_the_noise_has_no_jumps():
     n = 360_000
     x = 1e-3 * np.random.default_rng(1).normal(size=n) + 0.1 * np.arange(n) / n

@@ -28,8 +28,8 @@ CORRELATION = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 """Correlation times, in means, of the Gauss-Markov processes that are tried beside white noise, flicker and a walk."""
 TIMES = np.geomspace(0.005, 0.5, 15)
 """Time constants that are tried, in lengths of the log: a slower warm-up is like a straight line or a walk."""
-CYCLES = np.arange(1.5, 16.1, 0.125)
-"""Periods in the log that are tried: less than one and a half is drift, more is a line of the spectrum."""
+CYCLES = np.arange(1.0, 16.1, 0.125)
+"""Periods in the log that are tried: less than one is drift, more is a line of the spectrum."""
 MOST = 4
 """Most changes of one log: sums of more exponentials cannot be told apart."""
 PLAUSIBLE = float(np.log(MEANS))
@@ -122,9 +122,12 @@ Time = tuple[float, bool]
 
 
 def _are_apart(times: Sequence[Time]) -> bool:
-    """Whether time constants differ by as much as those tried: nearer ones have sizes of any amount, and opposite."""
+    """Whether time constants differ by as much as those tried, and waves by a period in the log, its resolution: nearer
+    ones have sizes of any amount, and opposite."""
     constants = sorted(time for time, is_wave in times if not is_wave)
-    return all(later >= TIMES[1] / TIMES[0] * time for time, later in pairwise(constants))
+    cycles = sorted(1.0 / time for time, is_wave in times if is_wave)
+    are_constants_apart = all(later >= TIMES[1] / TIMES[0] * time for time, later in pairwise(constants))
+    return are_constants_apart and all(more >= 1.0 + fewer for fewer, more in pairwise(cycles))
 
 
 @dataclass(frozen=True, eq=False)
