@@ -19,7 +19,7 @@ from test_export import given
 from trihedron import _core
 from trihedron.api.identifying import allan as noise_of
 from trihedron.cli import main
-from trihedron.estimate.noise.allan import KINDS, TYPES, allan_deviation
+from trihedron.estimate.noise.allan import KINDS, allan_deviation
 from trihedron.estimate.noise.streamed import stream_noise
 from trihedron.records import Recording
 from trihedron.report.noise import noise_report
@@ -27,6 +27,8 @@ from trihedron.report.noise_files import curve_csv
 from trihedron.units import AccelerationUnit, RateUnit
 
 RATE = 50.0
+NOISE = _core.AllanNoise
+TYPES = {2: NOISE.Quantisation, 0: NOISE.White, -1: NOISE.Flicker, -2: NOISE.Walk}
 NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
 
 

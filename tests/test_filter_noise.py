@@ -145,11 +145,17 @@ def before_a_tracker(seed, seconds):
     return log, ReferenceMotion(t[k], attitude=C[k], source="tracker")
 
 
+def stated(value, *, is_present):
+    """A term of the JSON of ``trihedron allan``."""
+    figures = dict.fromkeys(("estimate", "lower", "upper", "fitted"), value)
+    return {"present": is_present, "sigma": 0.0, "evidence": 0.0, **figures}
+
+
 @pytest.fixture(scope="module")
 def static(tmp_path_factory):
     path = tmp_path_factory.mktemp("static") / "allan.json"
     axes = [
-        {"unit": unit, "terms": {s: {"present": s == "N", "value": v, "limit": v} for s, v in (("N", n), ("K", n / 5))}}
+        {"unit": unit, "terms": {s: stated(v, is_present=s == "N") for s, v in (("N", n), ("K", n / 5))}}
         for unit, n in (("rad/s", N), ("m/s^2", 1e-3))
     ]
     path.write_text(json.dumps({"rate_hz": 100.0, "axes": axes}))

@@ -15,6 +15,7 @@
 //! Memory beside the input: one running sum (8 bytes per reading of one channel). Terms are computed in tiles of the
 //! running sum that stay in the cache while all clusters pass over them; see [`tiles`].
 
+pub mod along;
 pub mod degrees;
 pub mod edges;
 pub mod prefix;

@@ -7,6 +7,7 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::allan::along;
 use crate::allan::degrees::{self, NoiseType};
 use crate::allan::{self, Column, Curve, Kind, Stream};
 
@@ -15,6 +16,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<AllanStream>()?;
     module.add_class::<AllanNoise>()?;
     module.add_function(wrap_pyfunction!(allan_degrees, module)?)?;
+    module.add_function(wrap_pyfunction!(allan_degrees_along, module)?)?;
     module.add_function(wrap_pyfunction!(allan_variance, module)?)?;
     Ok(())
 }
@@ -75,6 +77,22 @@ fn allan_degrees(
     super::run(py, || {
         degrees::degrees_of_freedom(n, m, noise.into(), kind.into())
     })
+}
+
+/// Degrees of freedom of each variance of a curve, and its expectation over the Allan variance.
+#[pyfunction]
+fn allan_degrees_along<'py>(
+    py: Python<'py>,
+    n: usize,
+    clusters: Vec<usize>,
+    variance: Vec<f64>,
+    weight: Vec<f64>,
+    kind: AllanKind,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let (edf, bias) = super::run(py, || {
+        along::along(n, &clusters, &variance, &weight, kind.into())
+    })?;
+    Ok((edf.into_pyarray(py), bias.into_pyarray(py)))
 }
 
 /// Readings `(n, channels)` in the number type of the log: counts are read without a copy.

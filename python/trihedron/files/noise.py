@@ -1,6 +1,5 @@
 """Noise figures read from the JSON that ``trihedron allan`` writes."""
 
-import math
 import os
 from pathlib import Path
 from types import MappingProxyType
@@ -10,7 +9,7 @@ from trihedron.documents import read_json
 from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, SensorNoise
 from trihedron.records.finding import Finding
-from trihedron.records.noise import NOT_OF_THE_SENSOR, GaussMarkov, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.noise import NOT_OF_THE_SENSOR, GaussMarkov, NoiseAxis, NoiseTerm, TermName, of_axes
 from trihedron.records.plain import from_plain
 
 MEANT = "name a file written by `trihedron allan --json`"
@@ -108,11 +107,6 @@ def _term(symbol: TermName, said: dict[str, Any]) -> NoiseTerm:
 
 
 def _figure(axes: list[dict[str, Any]], unit: str, term: str, *, is_limit: bool = False) -> NoiseFigure:
-    terms = [axis["terms"][term] for axis in axes if axis["unit"] == unit]
-    if all(t["present"] for t in terms):
-        return NoiseFigure(_rms([float(t["value"]) for t in terms]), is_limit)
-    return NoiseFigure(_rms([max(float(t["limit"]), float(t["value"])) for t in terms]), is_limit=True)
-
-
-def _rms(values: list[float]) -> float:
-    return math.sqrt(sum(v * v for v in values) / len(values))
+    name = TermName(term)
+    value, is_absent = of_axes([_term(name, axis["terms"][term]) for axis in axes if axis["unit"] == unit])
+    return NoiseFigure(value, is_limit or is_absent)

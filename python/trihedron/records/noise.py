@@ -1,6 +1,7 @@
 """Records of noise: the terms of an axis with their uncertainties, and the noise of a log."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
@@ -8,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.finding import Finding, FindingCode, Judged, Severity
@@ -68,6 +69,13 @@ class NoiseTerm:
     def limit(self) -> float:
         """Upper end of the interval, the most that an absent term may be."""
         return self.upper
+
+
+def of_axes(terms: Sequence[NoiseTerm]) -> tuple[float, bool]:
+    """Root mean square of a term over the axes of a sensor, and whether it is a limit: that of the limits where an axis
+    lacks the term."""
+    is_limit = not all(one.is_present for one in terms)
+    return rms_of(np.array([one.limit if is_limit else one.value for one in terms])), is_limit
 
 
 @dataclass(frozen=True)

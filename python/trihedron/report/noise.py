@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.noise import of_axes
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
@@ -100,9 +101,9 @@ def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
     out = []
     for unit, axes in groups:
         name = {"gyro": "gyroscope", "accel": "accelerometer"}.get(axes[0].name.split()[0], axes[0].name.split()[0])
-        present = [a.terms[TermName.WHITE].value for a in axes if a.terms[TermName.WHITE].is_present]
+        present = [a.terms[TermName.WHITE] for a in axes if a.terms[TermName.WHITE].is_present]
         if present:
-            rms = math.sqrt(float(np.mean(np.square(present))))
+            rms, _ = of_axes(present)
             n = "1 axis" if len(present) == 1 else f"{len(present)} axes"
             beside = f"N, rms of {n}{_on_data_sheets(rms, unit)}"
             out.append(Headline(f"{name}, white noise", plain_number(rms), unit_of(TermName.WHITE, unit), beside))
@@ -272,16 +273,12 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
             ("noise_density", TermName.WHITE, "/√Hz"),
             ("random_walk", TermName.RATE_RANDOM_WALK, "/√s"),
         ):
-            # One value for three axes: the rms; an absent term is represented by its limit.
-            values = [axis.value(term) for axis in axes]
-            if all(axis.terms[term].is_present for axis in axes):
-                words = f"{math.sqrt(float(np.mean(np.square(values)))):.4g}"
-                if term is TermName.RATE_RANDOM_WALK and not noise.has_slow_noise_only:
-                    per += ", upper limit: it contains temperature or a turn"
-            else:
-                limit = math.sqrt(float(np.mean([max(a.terms[term].limit, a.value(term)) ** 2 for a in axes])))
-                words, per = f"{limit:.2g}", f"{per}, upper limit on an axis"
-            rows[f"{sensor}_{key}"] = f"{words}  # {square}{per}"
+            value, is_limit = of_axes([axis.terms[term] for axis in axes])
+            if is_limit:
+                per += ", upper limit on an axis"
+            elif term is TermName.RATE_RANDOM_WALK and not noise.has_slow_noise_only:
+                per += ", upper limit: it contains temperature or a turn"
+            rows[f"{sensor}_{key}"] = f"{value:.{2 if is_limit else 4}g}  # {square}{per}"
     rows["update_rate"] = f"{noise.curve.rate_hz:.6g}  # Hz"
     return rows
 

@@ -10,6 +10,7 @@ from trihedron.estimate.attitude import integrate_rate
 from trihedron.probability import NORMAL_95
 from trihedron.records import NoiseAxis, Segments, TermName
 from trihedron.records.filter_noise import Bounded, IntervalCheck, StaticNoise, TiltCheck
+from trihedron.records.noise import of_axes
 
 LONGEST_MOVE_S = 60.0
 """Longest move that is used: over more than a minute the bias may drift arbitrarily."""
@@ -31,10 +32,9 @@ def unlike_axes(axes: Sequence[NoiseAxis], unit: str) -> tuple[Bounded, ...]:
 
 def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
     terms = [axis.terms[term] for axis in axes]
-    if not all(one.is_present for one in terms):
-        limit = rms_of(np.array([max(one.limit, one.value) for one in terms]))
-        return Bounded(0.0, 0.0, limit, True)
-    value = rms_of(np.array([one.value for one in terms]))
+    value, is_limit = of_axes(terms)
+    if is_limit:
+        return Bounded(0.0, 0.0, value, True)
     # Errors of the axes are independent: variances add.
     spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, TINY))
     factor = math.exp(NORMAL_95 * spread / max(value, TINY))
