@@ -16,6 +16,7 @@ from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.read.audit.invalid import without_invalid
 from trihedron.read.audit.motionless import audit_motionless_accelerometer, audit_motionless_gyro
+from trihedron.read.audit.orientation import audit_orientation
 from trihedron.read.audit.readings import audit_readings, audit_seam, audit_steps
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
@@ -30,11 +31,13 @@ from trihedron.read.sensing import WHOLE, Judged, judge_accelerometer, judge_gyr
 from trihedron.read.sensors import Options, Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
-from trihedron.read.turning import PARTS, turning_of
+from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
+ONE_SETTING = (FindingCode.UNIT_CONTRADICTED, FindingCode.AXES_CHANGED)
+"""Findings about the units and axes of a sensor whose settings do not change."""
 TIMESTAMPS = "logged time after the first [s]"
 """Auxiliary column with the logged timestamps, where an even clock replaces them."""
 
@@ -162,6 +165,10 @@ def audited(
         judged = _judged_gyro(sensors, rate, windows, gyroscope_unit, extremes["gyroscope"])
         gyr_unit = RateUnit(judged.unit)
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
+    changes = audit_orientation(sensors, rate)
+    if changes:
+        # A scale or axes that change have no one unit, and gravity leaps where they do.
+        findings = [*changes, *(one for one in findings if one.code not in ONE_SETTING)]
     findings += of_clock
     facts = facts_in(present, windows, extremes)
     for done, (name, triad) in enumerate(present.items()):
@@ -216,15 +223,8 @@ def _judged_gyro(
     fits = (
         is_stated and clear is not None and judged.unit is not RateUnit.COUNTS and turning.fits(RateUnit(judged.unit))
     )
-    own, shared = turning.odd_correlation
     changed = _exchanged(sensors, rate_hz) if clear is None else []
-    if turning.odd_part:
-        changed.append(
-            Finding.of(
-                FindingCode.AXES_CHANGED, part=turning.odd_part, parts=PARTS, correlation=own, correlation_of_all=shared
-            )
-        )
-    elif clear is not None and acc is not None:
+    if clear is not None and acc is not None:
         changed = audit_seam(sensors.time_s, acc, sensors.gyroscope, clear, sensors.place)
     if clear is not None and clear.motionless:
         is_one_file = sensors.columns.gyroscope is not None

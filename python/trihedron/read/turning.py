@@ -24,11 +24,8 @@ TOLERANCE = 1.25
 apart."""
 _MIN_CORRELATION = 0.5
 """Rotation by hand with acceleration gives 0.7 and more; other motion and other quantities give less than 0.4."""
-PARTS, _FEWEST, _FEWEST_CHANGES = 4, 50, 9.0
-"""Parts of the log, each of which must fit with the same axes, the smallest number of blocks to test one, and of those
-that hold its changes of gravity, which are to determine nine elements: with a single one other axes fit as well."""
-_AXES_FIT, _MORE_UNEXPLAINED = 0.75, 4.0
-"""A part has other axes if they correlate so well, and the axes of the whole log leave 4 times the unexplained part."""
+_FEWEST = 50
+"""Smallest number of blocks in motion in which a channel is found motionless."""
 _MOST_SIGMA = 0.25
 """Largest relative σ of a scale that tells units a factor 17 apart: four of it and ``TOLERANCE`` are a factor 3.4."""
 _STILL, _ONE_SIDED = 2.0, 4.0
@@ -51,17 +48,14 @@ _SIGNED_AXES = tuple(
 @dataclass(frozen=True)
 class Turning:
     """The gyro's ``scale`` [rad/s per unit] from the rotation of gravity, its standard uncertainty, the correlation of
-    gravity's change with the gyro's prediction, and the number of blocks. ``odd_part`` (from 1; 0: none) of ``PARTS``
-    fits only with other axes; ``odd_correlation`` is that with its own axes and that with those of the whole log.
-    ``motionless`` (from 0) are gyro axes that read nothing while gravity rotates about them. ``clock_is_weighed``: the
-    unit of whole-numbered timestamps was inferred, not stated; ``rate_hz``: the rate at which the log was read."""
+    gravity's change with the gyro's prediction, and the number of blocks. ``motionless`` (from 0) are gyro axes that
+    read nothing while gravity rotates about them. ``clock_is_weighed``: the unit of whole-numbered timestamps was
+    inferred, not stated; ``rate_hz``: the rate at which the log was read."""
 
     scale: float
     sigma: float
     correlation: float
     n: int
-    odd_part: int = 0
-    odd_correlation: tuple[float, float] = (0.0, 0.0)
     motionless: tuple[int, ...] = ()
     clock_is_weighed: bool = False
     rate_hz: float = math.nan
@@ -133,19 +127,12 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
 
 @dataclass(frozen=True)
 class _Sums:
-    """Normal matrix (9, 9), right side (9,), sums of squares and fourth powers for gravity's change on rates; number of
-    blocks."""
+    """Normal matrix (9, 9), right side (9,) and sum of squares for gravity's change on rates; number of blocks."""
 
     normal: FloatArray
     right: FloatArray
     total: float
-    fourth: float
     n: int
-
-    @property
-    def is_enough(self) -> bool:
-        """Whether the changes of gravity are spread over enough blocks to tell axes from one another."""
-        return self.n >= _FEWEST and self.total**2 > _FEWEST_CHANGES * self.fourth
 
     def on(self, axes: FloatArray) -> Turning | None:
         """Scale and correlation for the orientation ``axes`` (3, 3) of the gyro in the accelerometer's frame."""
@@ -169,25 +156,14 @@ def _sums(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> _Sum
     cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
     cross -= cross.transpose(0, 2, 1)
     design = (step_s * cross[:, :, :, None] * w[:, None, None, :]).reshape(-1, 9)
-    squared = np.sum(seen**2, axis=1)
-    return _Sums(design.T @ design, design.T @ seen.ravel(), float(squared.sum()), float(squared @ squared), len(a))
+    return _Sums(design.T @ design, design.T @ seen.ravel(), float(np.sum(seen**2)), len(a))
 
 
 def _fitted(
     a: FloatArray, w: FloatArray, seen: FloatArray, starts: IntArray, is_noise: BoolArray, step_s: float
 ) -> Turning | None:
     """The scale from directions, rates and changes (n, 3) of blocks; ``starts`` are the first ones of each move."""
-    parts = [
-        _sums(*part, step_s)
-        for part in zip(np.array_split(a, PARTS), np.array_split(w, PARTS), np.array_split(seen, PARTS), strict=True)
-    ]
-    whole = _Sums(
-        sum((p.normal for p in parts), np.zeros((9, 9))),
-        sum((p.right for p in parts), np.zeros(9)),
-        sum(p.total for p in parts),
-        sum(p.fourth for p in parts),
-        len(a),
-    )
+    whole = _sums(a, w, seen, step_s)
     if not np.isfinite(whole.normal).all() or not whole.normal.any():
         return None
     values, vectors = np.linalg.eigh(whole.normal)
@@ -205,15 +181,7 @@ def _fitted(
     spread = float(np.std(without) * math.sqrt(len(power) - 1))
     turning = replace(turning, sigma=max(turning.sigma, spread))
     still = [k for k in range(3) if is_noise[k] and len(a) >= _FEWEST and _turns_about(axes[:, k], a, left)]
-    turning = replace(turning, motionless=tuple(still))
-    for k, part in enumerate(parts):
-        own, shared = part.best(_SIGNED_AXES), part.on(axes)
-        others = shared.correlation if shared is not None else 0.0
-        if not part.is_enough or own is None or own[0].correlation < _AXES_FIT:
-            continue
-        if 1.0 - others**2 > _MORE_UNEXPLAINED * (1.0 - own[0].correlation ** 2):
-            return replace(turning, odd_part=k + 1, odd_correlation=(own[0].correlation, others))
-    return turning
+    return replace(turning, motionless=tuple(still))
 
 
 def _turns_about(axis: FloatArray, a: FloatArray, left: FloatArray) -> bool:

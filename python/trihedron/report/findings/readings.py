@@ -10,11 +10,20 @@ ENTRIES = {
         "--columns device=COLUMN.",
     ),
     (Code.AXES_CHANGED, "", SERIOUS): Words(
-        "In part {part} of {parts} of the log the gyro's axes fit the accelerometer's in another order or sign "
-        "than in the whole "
-        "(correlation {correlation:.2f} instead of {correlation_of_all:.2f}).",
-        "Axes of one sensor were swapped or turned in the middle of the log.",
+        "The axes of the {sensor} change about {where} ({from_s:.1f} s to {to_s:.1f} s): from then on "
+        "{axes:each}{is_scaled:?, times {ratio:.3g}|}.",
+        "A reset of the sensor or its driver with other settings, or a sensor mounted anew"
+        "{has_others:?. Or it is the {other}: {others:each}|}.",
         "Split the log there, and calibrate the parts one by one.",
+        numbers=("sample",),
+        lines=dict.fromkeys(("axes", "others"), "{v0:axis} reads what {v1:?−|}{v2:axis} read"),
+    ),
+    (Code.AXES_CHANGED, "range", SERIOUS): Words(
+        "The scale of the {sensor} changes about {where} ({from_s:.1f} s to {to_s:.1f} s): from then on "
+        "it reads {ratio:.3g} times as much.",
+        "A reset of the sensor or its driver, with another range or unit.",
+        "Split the log there, and calibrate the parts one by one; or multiply the later readings by {inverse:.6g}.",
+        numbers=("sample",),
     ),
     (Code.AXES_CHANGED, "leap", SERIOUS): Words(
         "Gravity leaps from one sample to the next without as much rotation of the gyro (first: {where}; {count} in "
