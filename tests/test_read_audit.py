@@ -205,6 +205,33 @@ def test_a_clock_of_ticks_wraps_at_any_power_of_two_and_a_late_row_is_no_wrap(tm
     assert FindingCode.TIME_BACKWARD in codes(late)
 
 
+@pytest.mark.parametrize(("modulus", "per_s"), [(1000, 1e3), (60000, 1e3), (86400, 1.0), (604800, 1.0)])
+def test_milliseconds_of_a_second_and_seconds_of_a_day_are_continued_and_recordings_of_a_minute_are_not(
+    tmp_path, modulus, per_s
+):
+    table = counts()
+    start_s = modulus / per_s - 15.7
+    clock = np.round((table[:, 0] + start_s) * per_s, 6) % modulus
+    recording = read(tmp_path, np.column_stack([clock, table[:, 1:]]))
+    assert finding(recording, FindingCode.TIME_WRAPPED).numbers["modulus"] == modulus
+    assert recording.time_s[-1] == pytest.approx((N - 1) / 100.0)
+    # Two recordings of as many seconds as a clock has: each begins where the log began.
+    again = np.tile(np.arange(1000) / 100.0, 2)
+    with pytest.raises(ReadError, match="two recordings"):
+        read(tmp_path, np.column_stack([again, table[:2000, 1:]]))
+
+
+@pytest.mark.parametrize("set_back_s", [0.034, 0.3, 0.6])
+def test_rows_after_a_clock_that_was_set_back_keep_their_order(tmp_path, set_back_s):
+    table = counts()
+    later = table.copy()
+    later[N // 2 :, 0] -= set_back_s
+    recording = read(tmp_path, later)
+    assert finding(recording, FindingCode.TIME_BACKWARD).numbers["sample"] == N // 2
+    np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
+    np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], atol=1e-6)
+
+
 @pytest.mark.parametrize("modulus", [2**8, 2**9, 2**16, 2**24, 2**32])
 def test_a_packet_counter_tells_lost_samples_and_may_wrap(modulus):
     counter = (np.arange(1000) + modulus - 450).astype(float)

@@ -84,6 +84,8 @@ def build_clock(
             "choose another with --columns time=..., or --columns time=none with --rate."
         )
     raw, wraps = unwrap(raw, table, rows, findings) if steps.back else (raw, False)
+    if steps.back and not wraps:
+        raw = never_set_back(raw, table, rows, findings)
     order = order_of_rows(raw, table, column, rows, findings) if steps.back else None
     if order is not None:
         raw = in_order(raw, order, np.empty(len(order)))
@@ -122,7 +124,7 @@ def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int
 def unwrap(
     raw: FloatArray, table: Table, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> tuple[FloatArray, bool]:
-    """Timestamps from a tick counter, continued where it wraps, and whether it wraps."""
+    """Timestamps from a counter, continued where it wraps, and whether it wraps."""
     step = np.diff(raw)
     back = np.flatnonzero(step < 0)
     modulus = modulus_of(raw) if len(back) else 0.0
@@ -134,13 +136,46 @@ def unwrap(
     findings.append(
         Finding.of(
             FindingCode.TIME_WRAPPED,
-            bits=int(np.log2(modulus)),
+            modulus=modulus,
             count=len(back),
             where=_place(table, rows, int(back[0]) + 1),
             sample=back[0] + 1,
         )
     )
     return raw + np.cumsum(turns), True
+
+
+def never_set_back(
+    raw: FloatArray, table: Table, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
+) -> FloatArray:
+    """Timestamps that continue by a usual step where the clock was set back; as they are where rows are late.
+
+    Sorting gives late rows even steps; rows of a clock that was set back have them in the order of the file.
+    """
+    step, usual = np.diff(raw), usual_step(raw)
+    back = np.flatnonzero(step < 0)
+    order = np.argsort(raw, kind="stable")
+    is_far = np.abs(order - np.arange(len(order))).max() > MAX_DISPLACEMENT
+    if not len(back) or is_far or _n_uneven(step, usual) >= _n_uneven(np.diff(raw[order]), usual):
+        return raw
+    lifts = np.zeros(len(raw))
+    lifts[back + 1] = usual - step[back]
+    findings.append(
+        Finding.of(
+            FindingCode.TIME_BACKWARD,
+            "set",
+            count=len(back),
+            where=_place(table, rows, int(back[0]) + 1),
+            largest=-float(step.min()),
+            sample=back[0] + 1,
+        )
+    )
+    return raw + np.cumsum(lifts)
+
+
+def _n_uneven(step: FloatArray, usual: float) -> int:
+    """Number of steps that are not the usual one, to half of it."""
+    return int(np.count_nonzero(np.abs(step - usual) > 0.5 * usual))
 
 
 def in_order(values: FloatArray, rows: npt.NDArray[np.signedinteger], out: FloatArray) -> FloatArray:

@@ -23,17 +23,36 @@ def steps_of(time_s: FloatArray) -> Steps:
     return Steps(*_core.timestamp_steps(np.asarray(time_s, dtype=np.float64)))
 
 
-RESET = 100.0
-"""Usual steps between the largest value and a power of two from which on a counter was reset and did not wrap: samples
-lost at the wrap itself widen the distance, and a reset comes as close by chance once in rows / 100 logs."""
+RESET, EXACT = 100.0, 1.5
+"""Usual steps between the last value before a wrap, continued, and a power of two or another modulus from which on a
+counter was reset and did not wrap: samples lost at the wrap itself widen the distance, and a reset comes as close by
+chance once in rows / 100 logs. Seconds of a minute, a day or a week and decimal counters are rarer, and exact."""
+DECIMAL = tuple(
+    sorted(
+        {
+            *(10.0**k for k in range(2, 13)),
+            *(s * 10.0**k for s in (60, 3600, 43200, 86400, 604800) for k in (0, 3, 6, 9)),
+        }
+    )
+)
 
 
 def modulus_of(counter: FloatArray) -> float:
-    """The power of two, 2^8 or more, that the largest of whole numbers (n,) approaches; 0 where none can be a wrap."""
-    largest = float(counter.max())
-    modulus = 2.0 ** max(8, int(largest).bit_length())
-    is_whole = counter.min() >= 0 and np.all(counter == np.rint(counter))
-    return modulus if is_whole and modulus - largest <= RESET * usual_step(counter) else 0.0
+    """The modulus at which numbers (n,) wrap; 0 where their steps back are no wraps.
+
+    A power of two, 2^8 or more, that the largest of whole numbers approaches; or another usual one to which the steps
+    back add up to a usual step, unless the numbers begin again where the log began, as another recording does.
+    """
+    step, usual, largest = np.diff(counter), usual_step(counter), float(counter.max())
+    back = np.flatnonzero(step < 0)
+    if not len(back) or counter.min() < 0:
+        return 0.0
+    whole = usual - float(np.median(step[back]))
+    decimal = min(DECIMAL, key=lambda modulus: abs(modulus - whole))
+    if largest < decimal and abs(decimal - whole) <= EXACT * usual:
+        return decimal if counter[0] - counter[back + 1].min() > EXACT * usual else 0.0
+    binary = 2.0 ** max(8, int(largest).bit_length())
+    return binary if binary - largest <= RESET * usual and np.all(counter == np.rint(counter)) else 0.0
 
 
 def steps_of_counter(counter: FloatArray) -> FloatArray:

@@ -32,7 +32,7 @@ _TIMESTAMPS = {
         lines={"worst": "{v0:.4g} s before {v1}"},
     ),
     (Code.TIME_WRAPPED, "", NOTE): Words(
-        "The clock counter of {bits} bits starts again from 0 {count} times (first: {where}); the time was continued.",
+        "The clock starts again from 0 at {modulus:.12g}, {count} times (first: {where}); the time was continued.",
         numbers=("sample",),
     ),
     (Code.TIME_BACKWARD, "", WARNING): Words(
@@ -40,6 +40,13 @@ _TIMESTAMPS = {
         "{displaced_rows} rows.",
         "Packets that overtook each other.",
         "If the rows stand in the right order and the timestamps are wrong, read with --columns time=none and --rate.",
+        numbers=("sample",),
+    ),
+    (Code.TIME_BACKWARD, "set", WARNING): Words(
+        "The clock was set back at {count:# place} (first: {where}; by up to {largest:.4g} in its own unit); the rows "
+        "keep their order, and the time continues there by one interval.",
+        "A clock that was synchronised while the log ran.",
+        "Take the timestamps from a clock that is never set (monotonic).",
         numbers=("sample",),
     ),
     (Code.NON_FINITE, "time", WARNING): Words(
