@@ -90,15 +90,19 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
 
 def _log(row: dict[str, Any]) -> FleetLog:
     diagnosis, covariance = row.get("diagnosis") or {}, row.get("covariance")
-    plain = ("n_poses", "static_rms_m_s2", "held_out_rms_m_s2", "seconds")
     return FleetLog(
-        *(row[name] for name in ("name", "serial", "status")),
+        name=row["name"],
+        serial=row["serial"],
+        status=row["status"],
         reason=row.get("reason", ""),
         verdict=diagnosis.get("verdict", ""),
         effects=tuple(effect["id"] for effect in diagnosis.get("effects", ())),
         serious=tuple(row.get("serious", ())),
         is_trustworthy=bool(row.get("is_trustworthy", False)),
-        **{name: row.get(name) for name in plain},
+        n_poses=row.get("n_poses"),
+        static_rms_m_s2=row.get("static_rms_m_s2"),
+        held_out_rms_m_s2=row.get("held_out_rms_m_s2"),
+        seconds=row.get("seconds"),
         numbers=None if covariance is None else np.array(row["parameters"], dtype=np.float64),
         std=None if covariance is None else sigmas_of(np.array(covariance, dtype=np.float64)),
         reread=row.get("reread", ""),

@@ -256,6 +256,11 @@ def number(value: float) -> str:
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
 
+def short(value: float) -> str:
+    """A number with four digits, which is finer than the interval of any noise."""
+    return number(float(f"{value:.4g}"))
+
+
 def matrix_rows(values: FloatArray, indent: int) -> list[str]:
     """Rows of a matrix as a YAML sequence of sequences."""
     return [f"{' ' * indent}- [{row(r)}]" for r in values]

@@ -20,6 +20,7 @@ from trihedron.files.formats.contract import (
     number,
     of_si_readings,
     row,
+    short,
 )
 from trihedron.files.formats.losses import (
     has_bias,
@@ -108,6 +109,7 @@ def templates() -> Any:
     )
     made.filters |= {
         "number": lambda value: number(float(value)),
+        "short": short,
         "deg": degrees_from_radians,
         "row": row,
         "brackets": lambda values: f"[{row(values)}]",

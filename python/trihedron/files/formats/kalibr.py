@@ -18,7 +18,7 @@ from trihedron.files.formats.contract import (
     of_si_readings,
     row,
 )
-from trihedron.files.formats.noise_keys import KEYS, required, si_rows
+from trihedron.files.formats.noise_keys import KALIBR, required, si_rows
 from trihedron.files.formats.parsing import array_of, without_readings, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import in_frame, other_form
@@ -33,7 +33,7 @@ def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
     figures = required(lower, options, "Kalibr")
     equation = "a_m = M a + b;  w_m = M C_gyro_i w + A C_gyro_i a + b: true to measured."
     lines = [f"# {line}" for line in heading(lower, equation, ("gyro-g-sensitivity",))]
-    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KEYS["kalibr"])]
+    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KALIBR)]
     lines += [f"rostopic: {options.topic}", f"update_rate: {number(figures.rate_hz)}"]
     lines += ["# Intrinsics, named as in Kalibr's own results:", "model: scale-misalignment", "accelerometers:", "  M:"]
     lines += matrix_rows(M_a, 2)
@@ -61,7 +61,7 @@ def from_kalibr(text: str) -> Calibration | None:
     if isinstance(camera, dict) and "T_cam_imu" in camera and "imu0" not in document:
         raise without_readings("Kalibr's camchain-imucam.yaml")
     document = document.get("imu0", document)
-    if not isinstance(document, dict) or not {KEYS["kalibr"][0], KEYS["kalibr"][2]} <= document.keys():
+    if not isinstance(document, dict) or not {KALIBR[0], KALIBR[2]} <= document.keys():
         return None
     accel, gyro = document.get("accelerometers") or {}, document.get("gyroscopes") or {}
     M_a = array_of(accel.get("M"), (3, 3), np.eye(3))

@@ -27,18 +27,11 @@ class Figures:
         return (self.accel_N, self.accel_K) if sensor == "accelerometer" else (self.gyro_N, self.gyro_K)
 
 
-KEYS = {
-    "kalibr": (
-        *("accelerometer_noise_density", "accelerometer_random_walk"),
-        *("gyroscope_noise_density", "gyroscope_random_walk"),
-    ),
-    "vins-fusion": ("acc_n", "acc_w", "gyr_n", "gyr_w"),
-    "lio-sam": ("imuAccNoise", "imuAccBiasN", "imuGyrNoise", "imuGyrBiasN"),
-    "orb-slam3": ("IMU.NoiseAcc", "IMU.AccWalk", "IMU.NoiseGyro", "IMU.GyroWalk"),
-}
-"""Keys of densities and random walks in SI by target, in the order of :attr:`Figures.four`."""
-COVARIANCES = ("acc_cov", "b_acc_cov", "gyr_cov", "b_gyr_cov")
-"""FAST-LIO's keys in the same order."""
+KALIBR = (
+    *("accelerometer_noise_density", "accelerometer_random_walk"),
+    *("gyroscope_noise_density", "gyroscope_random_walk"),
+)
+"""Kalibr's keys of densities and random walks in SI, which OpenVINS has too, in the order of :attr:`Figures.four`."""
 
 
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:

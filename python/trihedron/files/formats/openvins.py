@@ -15,7 +15,7 @@ from trihedron.files.formats.contract import (
     row,
 )
 from trihedron.files.formats.kalibr import g_sensitivity, in_lower, lower_orthogonal
-from trihedron.files.formats.noise_keys import KEYS, required, si_rows
+from trihedron.files.formats.noise_keys import KALIBR, required, si_rows
 from trihedron.files.formats.parsing import array_of, numbers_in, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
@@ -42,7 +42,7 @@ def to_openvins(calibration: Calibration, options: ExportOptions) -> str:
     lines += ["# Biases are states of the filter, not keys of this file; here they were, in readings:"]
     lines += [f"#   accelerometer [{row(b_a)}]", f"#   gyroscope [{row(b_w)}]"]
     lines += ["imu0:", "  T_i_b:", *matrix_rows(np.eye(4), 4)]
-    lines += [f"  {line}" for line in si_rows(figures, KEYS["kalibr"])]
+    lines += [f"  {line}" for line in si_rows(figures, KALIBR)]
     lines += [f"  rostopic: {options.topic}", "  time_offset: 0.0", f"  update_rate: {number(figures.rate_hz)}"]
     lines += ['  model: "kalibr"']
     for key, value in (("Tw", Tw), ("R_IMUtoGYRO", C), ("Ta", M_a), ("R_IMUtoACC", np.eye(3)), ("Tg", Tg)):
