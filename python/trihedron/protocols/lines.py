@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from trihedron.protocols.framing import DAY_MS, Frame, LineFedDecoder, Sample, printed_numbers
+from trihedron.protocols.framing import DAY_MS, Frame, LineFedDecoder, Sample
 
 LEARN_LINES = 12
 """Lines of numbers from which the layout is learned."""
@@ -14,7 +14,8 @@ LEARN_LINES = 12
 _LONGEST_LINE = 600
 """Characters, enough for thirty labelled numbers; longer lines are binary."""
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN"
+_NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN|inf|Inf)"
+_ENDS = " ,;|\t"
 _LABELLED = re.compile(rf"([A-Za-zµ°_][^:=,;|\t]*?)\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)")
 # The timestamp that the Arduino serial monitor writes before a line, or a terminal program writes in brackets.
 _MONITOR = re.compile(r"^\s*\[?(\d{1,2}):(\d{2}):(\d{2})[.,](\d{1,6})\]?\s*(?:->)?\s*")
@@ -56,16 +57,14 @@ class LinesDecoder(LineFedDecoder):
     """
 
     name = "lines"
-    learned: tuple[str, ...] = ("columns", "clock_modulus", "tick_s", "_separator", "_n", "_time", "_counter")
-    learned += ("_keep", "_per_unit", "_monitor", "_pattern")
+    learned: tuple[str, ...] = ("columns", "clock_modulus", "tick_s", "_time", "_counter", "_keep", "_per_unit")
+    learned += ("_monitor", "_pattern")
 
     def __init__(self, name_columns: NameColumns = name_by_position) -> None:
         super().__init__()
         self._name_columns = name_columns
         self._first: list[str] = []
         self._n_first = 0
-        self._separator: str | None = ","
-        self._n = 0
         self._time: int | None = None
         self._counter: int | None = None
         self._keep: tuple[int, ...] = ()
@@ -82,7 +81,7 @@ class LinesDecoder(LineFedDecoder):
     def finish(self) -> list[Frame]:
         """Frames of the first lines if the layout is not learned yet; an incomplete last line is discarded."""
         super().finish()
-        return self._learn() if self._n == 0 and self._first else []
+        return self._learn() if self._pattern is None and self._first else []
 
     def _take(self, lines: list[bytearray]) -> list[Frame]:
         out: list[Frame] = []
@@ -92,8 +91,8 @@ class LinesDecoder(LineFedDecoder):
             except UnicodeDecodeError:
                 line = raw.decode("utf-8", "replace").strip("\r\x00 ")
             if len(line) > _LONGEST_LINE:
-                self.reject(raw, is_corrupt=self._n > 0)
-            elif self._n == 0:
+                self.reject(raw, is_corrupt=self._pattern is not None)
+            elif self._pattern is None:
                 out += self._first_line(line) if line else []
             elif (frame := self.frame_of(line)) is not None:
                 out.append(frame)
@@ -117,26 +116,23 @@ class LinesDecoder(LineFedDecoder):
         plain = [_unprefixed(line) for line in lines]
         counts = Counter(n for line in plain if (n := _fields_of_numbers(line)) > 1)
         if not counts:
-            for line in lines:
-                self.reject(line, is_corrupt=_is_damaged(line))
-            return []
+            return self._refused(lines)
         n = counts.most_common(1)[0][0]
         usual = [line for line in plain if _fields_of_numbers(line) == n]
-        labels = Counter(tuple(label for label, _ in _LABELLED.findall(line)) for line in usual).most_common(1)[0][0]
-        names: tuple[str, ...] | None = None
+        labels, _ = Counter(tuple(label for label, _ in _LABELLED.findall(line)) for line in usual).most_common(1)[0]
+        separator = _separator(usual)
         if len(labels) == n:
-            self._pattern = re.compile(
-                r".*?"
-                + r".*?".join(rf"(?<![A-Za-z]){re.escape(label)}\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)" for label in labels)
-            )
-            names = labels
-            rows = [[value for _, value in _LABELLED.findall(line)] for line in usual]
+            labelled = (rf"(?<![A-Za-z]){re.escape(label)}\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)" for label in labels)
+            pattern, names = re.compile(r".*?" + r".*?".join(labelled)), labels
         else:
-            self._separator = _separator(usual)
-            rows = [self._split(line) for line in usual]
-            names = self._header(plain, n)
+            between = r"\s+" if separator is None else rf"\s*{re.escape(separator)}\s*"
+            pattern, names = re.compile(r"\s*" + between.join([f"({_NUMBER})"] * n)), _header(plain, separator, n)
+        rows = [list(found.groups()) for line in usual if (found := pattern.fullmatch(line.rstrip(_ENDS)))]
+        if not rows:
+            return self._refused(lines)
+        self._pattern = pattern
         self._monitor = all(_MONITOR.match(line) for line in lines if _fields_of_numbers(_unprefixed(line)) == n)
-        self._settle(self._name_columns(names, [row for row in rows if len(row) == n]), n, rows)
+        self._settle(self._name_columns(names, rows), rows)
         out: list[Frame] = []
         for line in lines:
             frame = self.frame_of(line)
@@ -147,31 +143,25 @@ class LinesDecoder(LineFedDecoder):
                 self.reject(line, is_corrupt=bool(out) and _is_damaged(line))
         return out
 
-    def _settle(self, columns: LineColumns, n: int, rows: list[list[str]]) -> None:
-        self._n = n
+    def _refused(self, lines: list[str]) -> list[Frame]:
+        for line in lines:
+            self.reject(line, is_corrupt=_is_damaged(line))
+        return []
+
+    def _settle(self, columns: LineColumns, rows: list[list[str]]) -> None:
         self._time, self._counter = columns.time, columns.counter
         special = {self._counter, self._time} - {None}
-        self._keep = tuple(i for i in range(n) if i not in special)
+        self._keep = tuple(i for i in range(len(columns.names)) if i not in special)
         self.columns = tuple(columns.names[i] for i in self._keep)
         if self._time is not None:
             at, unit = self._time, columns.time_unit_s
-            digits = max((len(row[at].partition(".")[2]) for row in rows if len(row) == n), default=0)
+            digits = max(len(row[at].partition(".")[2]) for row in rows)
             # One tick is the last decimal: 12.345 s is 12345 ticks of 1 ms.
             self._per_unit = 10 ** min(digits, 9)
             self.tick_s = unit / self._per_unit
             self.clock_modulus = 1 << 32 if digits == 0 and unit < 1.0 else 0
         elif self._monitor:
             self.tick_s, self.clock_modulus = 1e-3, DAY_MS
-
-    def _split(self, line: str) -> list[str]:
-        return [field.strip() for field in line.rstrip(" ,;\t").split(self._separator)]
-
-    def _header(self, lines: list[str], n: int) -> tuple[str, ...] | None:
-        for line in lines:
-            fields = self._split(line.lstrip("#% "))
-            if len(fields) == n and all(field and not _is_number(field) for field in fields):
-                return tuple(fields)
-        return None
 
     def frame_of(self, line: str) -> Frame | None:  # type: ignore[override]
         """The frame of a line of the learned layout, or None."""
@@ -183,27 +173,28 @@ class LinesDecoder(LineFedDecoder):
             hours, minutes, seconds, part = found.groups()
             ticks = (int(hours) * 60 + int(minutes)) * 60_000 + int(seconds) * 1000 + int(part[:3].ljust(3, "0"))
             line = line[found.end() :]
-        if self._pattern is not None:
-            labelled = self._pattern.fullmatch(line.rstrip(" ,;|\t"))
-            if labelled is None:
-                return None
-            tokens: list[str] = list(labelled.groups())
-        else:
-            tokens = line.rstrip(" ,;\t").split(self._separator)
-        numbers = printed_numbers(tokens)
-        if len(tokens) != self._n or numbers is None:
+        found = None if self._pattern is None else self._pattern.fullmatch(line.rstrip(_ENDS))
+        if found is None:
             return None
+        tokens = found.groups()
+        numbers = [float(token) for token in tokens]
         try:
             counter = None if self._counter is None else int(tokens[self._counter])
             if self._time is not None:
                 ticks = round(numbers[self._time] * self._per_unit)
         except (ValueError, OverflowError):
             return None
-        keep = self._keep
-        if len(keep) == len(tokens):
-            return Frame(counter, ticks, tuple(numbers), ",".join(tokens).replace(" ", "").replace("\t", ""))
-        text = ",".join([tokens[i].strip() for i in keep])
-        return Frame(counter, ticks, tuple([numbers[i] for i in keep]), text)
+        text = ",".join([tokens[i] for i in self._keep])
+        return Frame(counter, ticks, tuple([numbers[i] for i in self._keep]), text)
+
+
+def _header(lines: list[str], separator: str | None, n: int) -> tuple[str, ...] | None:
+    """Names of ``n`` columns, if a line holds them."""
+    for line in lines:
+        fields = [field.strip() for field in line.lstrip("#% ").rstrip(" ,;\t").split(separator)]
+        if len(fields) == n and all(field and not _is_number(field) for field in fields):
+            return tuple(fields)
+    return None
 
 
 def _is_damaged(line: str) -> bool:
@@ -216,11 +207,7 @@ def _unprefixed(line: str) -> str:
 
 
 def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return re.fullmatch(_NUMBER, text) is not None
 
 
 def _separator(lines: list[str]) -> str | None:
