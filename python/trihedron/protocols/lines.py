@@ -120,10 +120,11 @@ class LinesDecoder(LineFedDecoder):
         n = counts.most_common(1)[0][0]
         usual = [line for line in plain if _fields_of_numbers(line) == n]
         labels, _ = Counter(tuple(label for label, _ in _LABELLED.findall(line)) for line in usual).most_common(1)[0]
+        names: tuple[str, ...] | None = labels
         separator = _separator(usual)
         if len(labels) == n:
             labelled = (rf"(?<![A-Za-z]){re.escape(label)}\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)" for label in labels)
-            pattern, names = re.compile(r".*?" + r".*?".join(labelled)), labels
+            pattern = re.compile(r".*?" + r".*?".join(labelled))
         else:
             between = r"\s+" if separator is None else rf"\s*{re.escape(separator)}\s*"
             pattern, names = re.compile(r"\s*" + between.join([f"({_NUMBER})"] * n)), _header(plain, separator, n)

@@ -30,8 +30,6 @@ LARGEST_LSB_RATIO = 1.1
 """Ratio of nominal and calibrated LSB above which they are of another range or part: parts are within 10 % of data
 sheets, and their scales as a rule within 3 %."""
 
-NO_GYRO = "no gyroscope in this calibration"
-
 
 @dataclass(frozen=True)
 class NoiseFigure:

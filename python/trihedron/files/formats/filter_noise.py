@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from trihedron.errors import InputError
 from trihedron.files.formats.contract import NoiseFigure, short
-from trihedron.files.formats.from_templates import templates
-from trihedron.files.formats.noise_keys import Figures, si_rows
+from trihedron.files.formats.from_templates import filled
+from trihedron.files.formats.noise_keys import Figures
 from trihedron.records.filter_noise import Bounded, FilterNoise, SensorFilterNoise
 from trihedron.records.finding import Severity
 
@@ -39,18 +39,7 @@ def filter_noise_text(found: FilterNoise, target: str) -> str:
             )
     accel, gyro = Sensor(figures["accelerometer"]), Sensor(figures["gyroscope"])
     four = Figures(accel.N, accel.K, gyro.N, gyro.K, found.rate_hz)
-    text: str = (
-        templates()
-        .get_template(f"noise/{target}.j2")
-        .render(
-            said=_beside(found),
-            accel=accel,
-            gyro=gyro,
-            rate=found.rate_hz,
-            in_keys=lambda *keys: "\n".join(si_rows(four, keys)),
-        )
-    )
-    return text
+    return filled(f"noise/{target}", four, said=_beside(found), accel=accel, gyro=gyro)
 
 
 def _figure(one: Bounded) -> NoiseFigure:

@@ -17,6 +17,7 @@ from trihedron.files.formats.contract import (
     Format,
     NoiseFigure,
     heading,
+    matrix_rows,
     number,
     of_si_readings,
     row,
@@ -76,21 +77,26 @@ class Target:
             return airsim(figures, said)
         accel = Sensor("accelerometer", known.accelerometer, figures.four[:2])
         gyro = Sensor("gyroscope", known.gyroscope, figures.four[2:])
-        text: str = (
-            templates()
-            .get_template(f"{name}.j2")
-            .render(
-                {
-                    **{"said": said, "accel": accel, "gyro": gyro},
-                    **{"topic": options.topic, "gravity": known.gravity_m_s2},
-                    **{"rate": figures.rate_hz, "root": math.sqrt(figures.rate_hz)},
-                    **{"per_degree": degrees_from_radians(1.0), "correlation_s": CORRELATION_S},
-                    "sensors": [accel] if known.gyroscope is None else [accel, gyro],
-                    "in_keys": lambda *keys: "\n".join(si_rows(figures, keys)),
-                }
-            )
+        sensors = [accel] if known.gyroscope is None else [accel, gyro]
+        names = {"said": said, "accel": accel, "gyro": gyro, "sensors": sensors, "gravity": known.gravity_m_s2}
+        return filled(name, figures, topic=options.topic, **names)
+
+
+def filled(name: str, figures: Figures, **names: Any) -> str:
+    """The text of a template; ``rate``, its ``root`` and ``in_keys`` are of the noise figures."""
+    text: str = (
+        templates()
+        .get_template(f"{name}.j2")
+        .render(
+            rate=figures.rate_hz,
+            root=math.sqrt(figures.rate_hz),
+            in_keys=lambda *keys: "\n".join(si_rows(figures, keys)),
+            per_degree=degrees_from_radians(1.0),
+            correlation_s=CORRELATION_S,
+            **names,
         )
-        return text
+    )
+    return text
 
 
 @cache
@@ -112,6 +118,7 @@ def templates() -> Any:
         "short": short,
         "deg": degrees_from_radians,
         "row": row,
+        "yaml": lambda values, indent: "\n".join(matrix_rows(values, indent)),
         "brackets": lambda values: f"[{row(values)}]",
         "blanks": lambda values: row(values).replace(",", ""),
         "braces": lambda values, end: f"{{{', '.join(f'{float(v) + 0.0!r}{end}' for v in values)}}}",

@@ -3,25 +3,27 @@
 M is lower triangular, C a rotation. Kalibr's results have the same keys under ``imu0``; it stores no biases.
 """
 
+from typing import Any
+
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.files.formats.contract import (
-    NO_GYRO,
     ExportOptions,
     Format,
     effect_parameters,
     given,
     heading,
-    matrix_rows,
-    number,
     of_si_readings,
-    row,
 )
-from trihedron.files.formats.noise_keys import KALIBR, required, si_rows
+from trihedron.files.formats.from_templates import filled
+from trihedron.files.formats.noise_keys import required
 from trihedron.files.formats.parsing import array_of, without_readings, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import in_frame, other_form
+
+REQUIRED = {"accelerometer_noise_density", "gyroscope_noise_density"}
+"""Keys by which a file of Kalibr is recognised."""
 
 
 def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
@@ -32,20 +34,13 @@ def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
     lower, M_a, b_a = in_lower(calibration, "Kalibr", options)
     figures = required(lower, options, "Kalibr")
     equation = "a_m = M a + b;  w_m = M C_gyro_i w + A C_gyro_i a + b: true to measured."
-    lines = [f"# {line}" for line in heading(lower, equation, ("gyro-g-sensitivity",))]
-    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KALIBR)]
-    lines += [f"rostopic: {options.topic}", f"update_rate: {number(figures.rate_hz)}"]
-    lines += ["# Intrinsics, named as in Kalibr's own results:", "model: scale-misalignment", "accelerometers:", "  M:"]
-    lines += matrix_rows(M_a, 2)
-    lines += ["  # not a key of Kalibr, which does not store biases:", f"  b: [{row(b_a)}]"]
-    if lower.gyroscope is None:
-        return "\n".join([*lines, f"# {NO_GYRO}", ""])
-    inverse, b = other_form(lower.gyroscope.S, lower.gyroscope.b)
-    M, C = lower_orthogonal(inverse)
-    lines += ["gyroscopes:", "  M:", *matrix_rows(np.tril(M), 2)]
-    lines += ["  A:", *matrix_rows(inverse @ g_sensitivity(lower) @ C.T, 2)]
-    lines += ["  C_gyro_i:", *matrix_rows(C, 2)]
-    return "\n".join([*lines, "  # not a key of Kalibr, which does not store biases:", f"  b: [{row(b)}]", ""])
+    said = heading(lower, equation, ("gyro-g-sensitivity",))
+    names: dict[str, Any] = {"said": said, "topic": options.topic, "M_a": M_a, "b_a": b_a, "M": None}
+    if lower.gyroscope is not None:
+        inverse, names["b"] = other_form(lower.gyroscope.S, lower.gyroscope.b)
+        M, C = lower_orthogonal(inverse)
+        names |= {"M": np.tril(M), "A": inverse @ g_sensitivity(lower) @ C.T, "C": C}
+    return filled("kalibr", figures, **names)
 
 
 def from_kalibr(text: str) -> Calibration | None:
@@ -61,7 +56,7 @@ def from_kalibr(text: str) -> Calibration | None:
     if isinstance(camera, dict) and "T_cam_imu" in camera and "imu0" not in document:
         raise without_readings("Kalibr's camchain-imucam.yaml")
     document = document.get("imu0", document)
-    if not isinstance(document, dict) or not {KALIBR[0], KALIBR[2]} <= document.keys():
+    if not isinstance(document, dict) or not document.keys() >= REQUIRED:
         return None
     accel, gyro = document.get("accelerometers") or {}, document.get("gyroscopes") or {}
     M_a = array_of(accel.get("M"), (3, 3), np.eye(3))

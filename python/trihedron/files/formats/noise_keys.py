@@ -27,13 +27,6 @@ class Figures:
         return (self.accel_N, self.accel_K) if sensor == "accelerometer" else (self.gyro_N, self.gyro_K)
 
 
-KALIBR = (
-    *("accelerometer_noise_density", "accelerometer_random_walk"),
-    *("gyroscope_noise_density", "gyroscope_random_walk"),
-)
-"""Kalibr's keys of densities and random walks in SI, which OpenVINS has too, in the order of :attr:`Figures.four`."""
-
-
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
     """The noise and rate that the target's reader requires.
 

@@ -5,17 +5,14 @@ import re
 import numpy as np
 
 from trihedron.files.formats.contract import (
-    NO_GYRO,
     ExportOptions,
     Format,
     given,
     heading,
-    matrix_rows,
-    number,
-    row,
 )
+from trihedron.files.formats.from_templates import filled
 from trihedron.files.formats.kalibr import g_sensitivity, in_lower, lower_orthogonal
-from trihedron.files.formats.noise_keys import KALIBR, required, si_rows
+from trihedron.files.formats.noise_keys import required
 from trihedron.files.formats.parsing import array_of, numbers_in, yaml_of
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
@@ -24,30 +21,27 @@ from trihedron.sensor_model import other_form
 def to_openvins(calibration: Calibration, options: ExportOptions) -> str:
     """The IMU chain file for ``model: kalibr``.
 
-    Comments are on separate lines: OpenCV's reader takes a value followed by a comment for a sequence.
-
     Raises ``InputError`` when noise or rate, which the reader requires, are not given.
     """
     lower, M_a, b_a = in_lower(calibration, "OpenVINS", options)
     figures = required(lower, options, "OpenVINS")
     equation = "a = inv(Ta) (a_m - b_a);  w = R_IMUtoGYRO^T inv(Tw) (w_m - b_w - Tg a)."
-    lines = ["%YAML:1.0", *(f"# {line}" for line in heading(lower, equation, ("gyro-g-sensitivity",)))]
     Tw, C, Tg, b_w = np.eye(3), np.eye(3), np.zeros((3, 3)), np.zeros(3)
     if lower.gyroscope is not None:
         inverse, b_w = other_form(lower.gyroscope.S, lower.gyroscope.b)
         M, C = lower_orthogonal(inverse)
         Tw, Tg = np.tril(M), inverse @ g_sensitivity(lower)
-    else:
-        lines.append(f"# {NO_GYRO}: Tw and R_IMUtoGYRO are those of an ideal one.")
-    lines += ["# Biases are states of the filter, not keys of this file; here they were, in readings:"]
-    lines += [f"#   accelerometer [{row(b_a)}]", f"#   gyroscope [{row(b_w)}]"]
-    lines += ["imu0:", "  T_i_b:", *matrix_rows(np.eye(4), 4)]
-    lines += [f"  {line}" for line in si_rows(figures, KALIBR)]
-    lines += [f"  rostopic: {options.topic}", "  time_offset: 0.0", f"  update_rate: {number(figures.rate_hz)}"]
-    lines += ['  model: "kalibr"']
-    for key, value in (("Tw", Tw), ("R_IMUtoGYRO", C), ("Ta", M_a), ("R_IMUtoACC", np.eye(3)), ("Tg", Tg)):
-        lines += [f"  {key}:", *matrix_rows(value, 4)]
-    return "\n".join([*lines, ""])
+    return filled(
+        "openvins",
+        figures,
+        said=heading(lower, equation, ("gyro-g-sensitivity",)),
+        has_gyro=lower.gyroscope is not None,
+        topic=options.topic,
+        identity4=np.eye(4),
+        matrices=(("Tw", Tw), ("R_IMUtoGYRO", C), ("Ta", M_a), ("R_IMUtoACC", np.eye(3)), ("Tg", Tg)),
+        b_a=b_a,
+        b=b_w,
+    )
 
 
 def from_openvins(text: str) -> Calibration | None:

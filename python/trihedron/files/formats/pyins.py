@@ -4,7 +4,8 @@ import re
 
 import numpy as np
 
-from trihedron.files.formats.contract import ExportOptions, Format, given, heading, row
+from trihedron.files.formats.contract import ExportOptions, Format, given, heading
+from trihedron.files.formats.from_templates import NONE, filled
 from trihedron.files.formats.parsing import numbers_in
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
@@ -13,14 +14,9 @@ from trihedron.sensor_model import other_form
 def to_pyins(calibration: Calibration, _options: ExportOptions) -> str:
     """Arrays for ``pyins.inertial_sensor.Parameters``."""
     equation = "x_out = T x + b: true to measured, the inverse of the direct form."
-    lines = [*(f"# {line}" for line in heading(calibration, equation)), "import numpy as np"]
-    for (_, sensor), name in zip(calibration.sensors, ("accel", "gyro"), strict=False):
-        T, b = other_form(sensor.S, sensor.b)
-        lines += [
-            f"{name}_transform = np.array([{', '.join(f'[{row(r)}]' for r in T)}])",
-            f"{name}_bias = np.array([{row(b)}])",
-        ]
-    return "\n".join([*lines, ""])
+    named = zip(calibration.sensors, ("accel", "gyro"), strict=False)
+    sensors = [(name, *other_form(sensor.S, sensor.b)) for (_, sensor), name in named]
+    return filled("pyins", NONE, said=heading(calibration, equation), sensors=sensors)
 
 
 def from_pyins(text: str) -> Calibration | None:

@@ -4,7 +4,8 @@ import re
 
 import numpy as np
 
-from trihedron.files.formats.contract import ExportOptions, Format, given, heading, row
+from trihedron.files.formats.contract import ExportOptions, Format, given, heading
+from trihedron.files.formats.from_templates import NONE, filled
 from trihedron.files.formats.parsing import numbers_in
 from trihedron.records import Calibration
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
@@ -16,18 +17,12 @@ _TO_SI = {"accelerometer": STANDARD_GRAVITY_M_S2, "gyroscope": 1.0 / degrees_fro
 def to_xio(calibration: Calibration, _options: ExportOptions) -> str:
     """Arrays in C for Fusion's functions."""
     equation = "corrected = misalignment * (sensitivity o (raw - offset)), in the units that Fusion expects."
-    lines = [f"// {line}" for line in heading(calibration, equation, corrected_in="g, deg/s")]
+    sensors = []
     for name, sensor in calibration.sensors:
         S = sensor.S / _TO_SI[name]
         scale = np.diag(S)
-        rows = ", ".join(row(r) for r in S / scale)
-        bias = -np.linalg.solve(sensor.S, sensor.b)
-        lines += [
-            f"const FusionMatrix {name}Misalignment = {{{rows}}};",
-            f"const FusionVector {name}Sensitivity = {{{row(scale)}}};",
-            f"const FusionVector {name}Offset = {{{row(bias)}}};",
-        ]
-    return "\n".join([*lines, ""])
+        sensors.append((name, S / scale, scale, -np.linalg.solve(sensor.S, sensor.b)))
+    return filled("xio", NONE, said=heading(calibration, equation, corrected_in="g, deg/s"), sensors=sensors)
 
 
 def from_xio(text: str) -> Calibration | None:
