@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import AXES, TINY, FloatArray, sigmas_of
+from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried
 from trihedron.estimate.session.fit import SessionSolution
@@ -58,7 +59,7 @@ def findings_of(
     yield from _g_sensitivity_findings(measured, solution)
     # A random walk of b is part of the model; a curve says that b of this log is not b of the next.
     is_curve = "gyro-bias-drift" in solution.observed.causes and _is_material(np.ptp(measured.bias, axis=0), measured)
-    yield from drift_findings("drifts" if is_curve else "poses", measured.bias, measured.bias_excess, S)
+    yield from drift_findings("drifts" if is_curve else "poses", measured, S)
 
 
 def handedness(
@@ -168,8 +169,9 @@ def _is_material(change: FloatArray, measured: MoveMeasurements) -> bool:
     return bool(np.any(change * lasts_s > measured.noise_density * np.sqrt(lasts_s)))
 
 
-def drift_findings(case: str, bias: FloatArray, excess: FloatArray, S: FloatArray) -> Iterator[Finding]:
-    """Finding where raw biases (n, 3) of ``case`` (poses, drifts) differ: ``excess`` (3,) is their χ²."""
+def drift_findings(case: str, measured: MoveMeasurements, S: FloatArray) -> Iterator[Finding]:
+    """Finding where the biases of the poses differ (``case``: poses, drifts)."""
+    bias, excess = measured.bias, pool_biases(measured.bias_read, measured.var_bias_read)[1]
     dof = len(bias) - 1
     if dof < 1 or chdtrc(dof, float(excess.max())) > FALSE_ALARM / 3.0:
         return

@@ -65,7 +65,6 @@ class MoveMeasurements:
     nominal_step_s: float
     clipped_s: FloatArray
     is_gapped: BoolArray
-    bias_excess: FloatArray
     rate: FloatArray
     force: FloatArray
     is_undithered: BoolArray
@@ -91,12 +90,11 @@ class MoveMeasurements:
         """The moves without what the gyro reads ``by_force`` (3, 3), raw unit per m/s², of an accelerometer S, b."""
         of_poses = (self.reading @ S.T + b) @ by_force.T
         read = self.bias_read - of_poses
-        mean, excess, _ = pool_biases(read, self.var_bias_read)
-        bias, var_bias = shrink(read, self.var_bias_read, mean)
+        bias, var_bias = shrink(read, self.var_bias_read, pool_biases(read, self.var_bias_read)[0])
         bias = np.where(self.is_undithered, self.bias - of_poses, bias)
         return replace(
             self, rate=self.rate - (self.force @ S.T + b) @ by_force.T, bias_read=read, bias=bias,
-            var_bias=np.where(self.is_undithered, self.var_bias, var_bias), bias_excess=excess,
+            var_bias=np.where(self.is_undithered, self.var_bias, var_bias),
         )  # fmt: skip
 
 
@@ -154,8 +152,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     of_rounding, hidden, shared = _rounded(gyroscope, quantum, gyroscope_mean, undithered, (in_log, rows))
     time_s = recording.time_s[rows]
     bias_read, var_bias_read = bias, var_bias
-    mean, excess, _ = pool_biases(bias, var_bias)
-    bias, var_bias = shrink(bias, var_bias, mean)
+    bias, var_bias = shrink(bias, var_bias, pool_biases(bias, var_bias)[0])
     if np.any(undithered):
         of_codes, own = _by_codes(bias_read, segments, gyroscope, quantum, undithered)
         bias, var_bias = np.where(undithered, of_codes, bias), np.where(undithered, own**2, var_bias)
@@ -180,7 +177,6 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         nominal_step_s=nominal,
         clipped_s=np.array([nominal * np.count_nonzero(is_clipped[a:b].any(axis=1)) for a, b in edges]),
         is_gapped=np.array([np.max(np.diff(time_s[a:b]), initial=0.0) > GAP_STEPS * nominal for a, b in edges]),
-        bias_excess=excess,
         rate=rate,
         force=raw_force[rows],
         is_undithered=undithered,

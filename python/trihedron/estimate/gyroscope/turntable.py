@@ -174,17 +174,9 @@ SLOWEST = 20.0
 """Smallest rate of a turn, in standard errors of a block's mean."""
 
 
-@dataclass(frozen=True, eq=False)
-class Plateaus:
-    """Stretches of steady rotation: half-open ``spans`` (k, 2), mean reading (k, 3) raw and its covariance."""
-
-    spans: tuple[tuple[int, int], ...]
-    mean: FloatArray
-    covariance: FloatArray
-
-
-def plateaus(recording: Recording, segments: Segments) -> Plateaus:
-    """Stretches of steady rotation of ``SHORTEST_S`` or longer, in the moves between poses."""
+def plateaus(recording: Recording, segments: Segments) -> tuple[list[tuple[int, int]], FloatArray, FloatArray]:
+    """Stretches of steady rotation of ``SHORTEST_S`` or longer, in the moves between poses: half-open ranges (k), mean
+    reading (k, 3) raw and its covariance (k, 3, 3)."""
     assert recording.gyroscope is not None
     assert segments.gyroscope_mean is not None
     assert segments.gyroscope_sigma is not None
@@ -205,7 +197,7 @@ def plateaus(recording: Recording, segments: Segments) -> Plateaus:
             white = np.diag(noise**2) / ((last - first) * size)
             hidden = np.diag(np.where(undithered_axes(quantum, segments.gyroscope_sigma), quantum**2 / 12.0, 0.0))
             covariances.append(np.maximum(white, np.diag(mine.var(axis=0, ddof=1) / (last - first))) + hidden)
-    return Plateaus(tuple(spans), np.array(means).reshape(-1, 3), np.array(covariances).reshape(-1, 3, 3))
+    return spans, np.array(means).reshape(-1, 3), np.array(covariances).reshape(-1, 3, 3)
 
 
 def _steady(blocks: FloatArray, rest: FloatArray, sigma: FloatArray) -> list[tuple[int, int]]:
@@ -248,11 +240,11 @@ def on_turntable(
         raise InputError("a turntable calibrates the gyro, and this log has none.")
     if calibration.gyroscope is None:
         return calibration  # a finding says why the poses leave the gyro out
-    found = plateaus(recording, segments)
-    speeds = _speeds(found, speeds_deg_s, recording.rate_hz)
+    spans, mean, covariance = plateaus(recording, segments)
+    speeds = _speeds(spans, speeds_deg_s, recording.rate_hz)
     used = speeds > 0.0
     unshared = np.zeros((len(speeds), 3, 0))
-    rates = StatedRates(found.mean, found.covariance, unshared, speeds, speeds, relative_sigma).of(used)
+    rates = StatedRates(mean, covariance, unshared, speeds, speeds, relative_sigma).of(used)
     updated = rates.scattered_on(calibration)
     if not updated.is_fitted:
         return replace(calibration, findings=(*calibration.findings, not_fitted(rates, updated, is_turned=False)))
@@ -261,14 +253,14 @@ def on_turntable(
     return replace(after, findings=(*calibration.findings, said))
 
 
-def _speeds(found: Plateaus, speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:
-    n, given = len(found.spans), np.abs(np.radians(np.asarray(speeds_deg_s, dtype=np.float64)))
+def _speeds(spans: list[tuple[int, int]], speeds_deg_s: Sequence[float], rate_hz: float) -> FloatArray:
+    n, given = len(spans), np.abs(np.radians(np.asarray(speeds_deg_s, dtype=np.float64)))
     if not np.isfinite(given).all() or not np.any(given > 0.0):
         raise InputError("speeds of a turntable are numbers in °/s: one for all turns, or one each; 0 leaves one out.")
     if n == 0:
         raise InputError("no steady turn of a second or longer was found: let the table run at its speed for 5 s.")
     if len(given) not in (1, n):
-        at = ", ".join(f"{begin / rate_hz:.1f}-{end / rate_hz:.1f}" for begin, end in found.spans[:40])
+        at = ", ".join(f"{begin / rate_hz:.1f}-{end / rate_hz:.1f}" for begin, end in spans[:40])
         raise InputError(
             f"{len(given)} speeds were given and {n} steady turns were found (seconds {at}): "
             "give one for all, or one a turn; 0 leaves a turn out."

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import TINY, BoolArray, FloatArray, rms_of
+from trihedron.arrays import BoolArray, FloatArray, rms_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.reference.beside import Beside
@@ -44,44 +44,30 @@ def fit_gyroscope(
     grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *, clock: int = 2
 ) -> GyroFit:
     """Fit ``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 fixes τ and ε, 1 frees τ, 2 both."""
-    middle = float(np.mean(grid.time_s[windows.middle]))
-    solution: Solution | None = None
-    for _ in range(TURNS if clock else 1):
-        target, design = _rows(grid, reference, windows, offset_s, rate)
-        if clock:
-            theta = _quick(target, design) if solution is None else solution.theta[: design.shape[2]]
-            half = 0.25 * grid.step_s
-            slope = [
-                t - d @ theta
-                for t, d in (_rows(grid, reference, windows, offset_s + side * half, rate) for side in (1.0, -1.0))
-            ]
-            by_offset = -(slope[0] - slope[1]) / (2.0 * half)
-            columns = [by_offset]
-            if clock == 2:
-                columns.append(by_offset * (grid.time_s[windows.middle] - middle)[:, None])
-            design = np.concatenate([design, np.stack(columns, axis=2)], axis=2)
-        size = np.linalg.norm(target, axis=1)
-        solution = solve(design, target, windows.start // windows.spacing, size, WHITE)
-        if not clock:
-            break
-        moved = solution.theta[-clock:]
-        rate_change = float(moved[1]) if clock == 2 else 0.0
+    middle, index = float(np.mean(grid.time_s[windows.middle])), windows.start // windows.spacing
+    target, design = _rows(grid, reference, windows, offset_s, rate)
+    size = np.linalg.norm(target, axis=1)
+    solution = solve(design, target, index, size, WHITE)
+    for _ in range(TURNS if clock else 0):
+        half = 0.25 * grid.step_s
+        later, earlier = (
+            t - d @ solution.theta[:12]
+            for t, d in (_rows(grid, reference, windows, offset_s + side * half, rate) for side in (1.0, -1.0))
+        )
+        by_offset = (earlier - later) / (2.0 * half)
+        columns = [by_offset, by_offset * (grid.time_s[windows.middle] - middle)[:, None]][:clock]
+        solution = solve(np.concatenate([design, np.stack(columns, axis=2)], axis=2), target, index, size, WHITE)
+        moved, rate_change = np.append(solution.theta[12:], 0.0)[:2].tolist()
         # Limited to the uncertainty of the alignment by correlation.
-        change = float(np.clip(moved[0], -0.1, 0.1))
+        change = float(np.clip(moved, -0.1, 0.1))
         offset_s += change - rate_change * middle
         rate += rate_change
         if abs(change) < 1e-7 and abs(rate_change) * (grid.time_s[-1] - grid.time_s[0]) < 1e-7:
             break
-    assert solution is not None
+        target, design = _rows(grid, reference, windows, offset_s, rate)
+        size = np.linalg.norm(target, axis=1)
     A, a = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
     return GyroFit(A, a, offset_s, rate, solution, middle, size)
-
-
-def _quick(target: FloatArray, design: FloatArray) -> FloatArray:
-    p = design.shape[2]
-    scale = np.sqrt(np.mean(design**2, axis=(0, 1))) + TINY
-    theta: FloatArray = np.linalg.lstsq((design / scale).reshape(-1, p), target.ravel(), rcond=None)[0]
-    return np.asarray(theta / scale)
 
 
 def _rows(
