@@ -213,10 +213,8 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         # Calm blocks beside a steady pose are its settling, not another pose.
         free[slice(*grown(free, (run.first, run.last)))] = False
     attitude = channels.mean[:, accelerometer] / gravity
-    bias = (
-        medians(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()])) if (steady) else None
-    )
-    shortest, bump = channels.blocks(LEAST_POSE_S), channels.blocks(BUMP_S)
+    bias = medians(np.vstack([run.quiet_rows(channels.mean) for run in steady])) if steady else None
+    shortest = channels.blocks(LEAST_POSE_S)
     found: list[Run] = []
     for first, last in ranges_of(free):
         run = Run(first, last, (), True)
@@ -224,13 +222,10 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
             continue
         if bias is not None and turns_on(channels, first, last, bias, steady):
             continue
-        if any(
-            max(first - near.last, near.first - last) < bump and _sway(attitude, [near, run]) < SWAY_RAD
-            for near in steady
-        ):
+        if any(is_one_pose(channels, attitude, run, near) for near in steady):
             # The same pose before it settled, or after it was disturbed.
             continue
-        if found and first - found[-1].last < bump and _sway(attitude, [found[-1], run]) < SWAY_RAD:
+        if found and is_one_pose(channels, attitude, run, found[-1]):
             before = found.pop()
             run = Run(before.first, last, (*before.bumps, (before.last, first)), True)
         found.append(run)
@@ -290,9 +285,15 @@ def _gyro_noise(channels: Channels, still: Sequence[Run]) -> float:
     return float(np.median([part.var(axis=0).sum() for part in parts])) if parts else 0.0
 
 
+def is_one_pose(channels: Channels, attitude: FloatArray, run: Run, near: Run) -> bool:
+    """Whether a run is the pose ``near`` before or after a disturbance: close in time, and within a hand's sway."""
+    apart = max(run.first - near.last, near.first - run.last)
+    return apart < channels.blocks(BUMP_S) and _sway(attitude, [near, run]) < SWAY_RAD
+
+
 def _sway(attitude: FloatArray, runs: list[Run]) -> float:
     """Scatter of the attitude over all runs together [rad]."""
-    blocks = np.vstack([attitude[a:b] for run in runs for a, b in run.quiet_ranges()])
+    blocks = np.vstack([run.quiet_rows(attitude) for run in runs])
     return float(np.linalg.norm(blocks.std(axis=0)))
 
 

@@ -12,11 +12,11 @@ from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.floor import Activity, quiet_channels
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
-    BUMP_S,
     SEEN_S,
     SWAY_RAD,
     EdgeNoise,
     Run,
+    is_one_pose,
     run_mean,
     trim_edges,
     turns_on,
@@ -78,12 +78,12 @@ def find_vibrating(
     calm = np.linalg.norm(rolling_mean(rate, WINDOW_BLOCKS), axis=1) < CALM_RAD_S
     white = (activity.white_variance[~gyro], activity.white_variance[gyro])
     settled = [run for run in taken if not run.is_unsteady]
-    seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled, SEEN_S)
+    seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled)
     seen_calm = [run for run in seen_calm if not _turns(channels, run, settled)]
     spans = [(run.first * channels.length, run.last * channels.length) for run in seen_calm]
     lines = [run for run, span in zip(seen_calm, spans, strict=True) if is_shaken_by_a_support(recording, span, white)]
     lines = [run for run in lines if not any(run.first < one.last and one.first < run.last for one in taken)]
-    still = _poses(channels, seen, quiet & free, [*taken, *lines], SEEN_S)
+    still = _poses(channels, seen, quiet & free, [*taken, *lines])
     shaken = (run for run in still if _shakes(channels, activity, run) and not _turns(channels, run, settled))
     return [*taken, *lines, *shaken]
 
@@ -110,19 +110,19 @@ class _Seen:
     steady: list[Range]
 
 
-def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run], shortest_s: float) -> list[Run]:
-    """Calm ranges (m,) that stay in place, last ``shortest_s``, and are no part of a ``taken`` run."""
+def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run]) -> list[Run]:
+    """Calm ranges (m,) that stay in place, last ``SEEN_S``, and are no part of a ``taken`` run."""
     calm = calm.copy()
     for run in taken:
         # Calm blocks beside a pose are its settling, not another pose.
         calm[slice(*grown(calm, (run.outer_first, run.outer_last)))] = False
     found: list[Run] = []
-    shortest = max(channels.blocks(shortest_s), WINDOW_BLOCKS)
+    shortest = max(channels.blocks(SEEN_S), WINDOW_BLOCKS)
     for first, last in ranges_of(calm):
         if last - first < shortest or not _stays(seen, (first, last)):
             continue
         run = Run(first, last, (), True)
-        if any(_is_one_pose(channels, seen.attitude, run, near) for near in [*taken, *found]):
+        if any(is_one_pose(channels, seen.attitude, run, near) for near in [*taken, *found]):
             continue
         noise = _own_noise(channels, run, seen.steady)
         run = trim_edges(channels, run, EdgeNoise.of(channels, noise))
@@ -194,13 +194,6 @@ def _is_no_hand(readings: FloatArray, white_variance: FloatArray, hand: float, i
     for times in HARMONICS:
         line[max(times * peak - LINE_BINS, 0) : times * peak + LINE_BINS + 1] = True
     return float((power[line] - noise).sum()) > LINE_SHARE * above
-
-
-def _is_one_pose(channels: Channels, attitude: FloatArray, run: Run, near: Run) -> bool:
-    """Whether a run is the pose ``near`` before or after its vibration: close in time, and within a hand's sway."""
-    apart_s = max(run.first - near.last, near.first - run.last) * channels.step_s
-    both = np.vstack([attitude[run.first : run.last], attitude[near.first : near.last]])
-    return apart_s < BUMP_S and float(np.linalg.norm(both.std(axis=0))) < SWAY_RAD
 
 
 def _own_noise(channels: Channels, run: Run, steady: list[Range]) -> MeanNoise:
