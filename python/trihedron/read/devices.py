@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from trihedron.read.clock.base import unwrap
 from trihedron.read.columns import SENSORS, Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name, sensor_said
-from trihedron.read.table import Table
+from trihedron.read.table import Options, Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.words import Words
 from trihedron.records.words import words as phrase
@@ -82,14 +82,6 @@ _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magn
 """Sensors of records named by a letter, used only where all records are: letters may also name devices A, B, ..."""
 
 
-@dataclass(frozen=True)
-class Choice:
-    """The user's choice among several logs in a file: topic or member, instance."""
-
-    topic: str | None = None
-    instance: str | None = None
-
-
 def pick_kind(words: list[str], kind: str) -> str | None:
     """The record name to use for a sensor; uncorrected readings are preferred to corrected ones."""
     fitting = [word for word in words if sensor_said(word) == kind]
@@ -99,7 +91,7 @@ def pick_kind(words: list[str], kind: str) -> str | None:
     return max(fitting, key=lambda w: ("uncal" in w.lower(), -words.index(w)), default=None)
 
 
-def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
+def one_device(table: Table, options: Options, chosen_columns: Columns) -> Table:
     """The rows of one device, where a column identifies several.
 
     The column is that of role ``device``, or one without a role that is recognised by its name, or because its codes
@@ -116,10 +108,10 @@ def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
     found = _device_column(table, named, lambda _: True)
     if found is None and readings and (n := n_interleaved(np.stack(readings, axis=1))) > 1:
         found = _device_column(table, others, lambda codes: bool(np.mean(np.diff(codes[order]) != 0) > 0.5))
-        if found is None and choice.instance is None:
+        if found is None and options.instance is None:
             return replace(table, findings=(*table.findings, Finding.of(FindingCode.DEVICES_INTERLEAVED, n=n)))
         if found is None:
-            return _by_turn(table, choice.instance or "", n, time)
+            return _by_turn(table, options.instance or "", n, time)
     if found is None and time is not None and (back := _steps_back(table, time)) is not None:
         # A column that changes where the clock goes back and almost nowhere else.
         found = _device_column(
@@ -127,26 +119,26 @@ def one_device(table: Table, choice: Choice, chosen_columns: Columns) -> Table:
             others,
             lambda codes: bool(np.diff(codes)[back].all() and np.count_nonzero(np.diff(codes)) <= 2 * len(back) + 1),
         )
-    if found is None and choice.instance is not None:
+    if found is None and options.instance is not None:
         raise ReadError(
-            f"{table.path}: instance {choice.instance} was given, but no column identifies devices; leave "
+            f"{table.path}: instance {options.instance} was given, but no column identifies devices; leave "
             "--instance out."
         )
     if found is None:
         return table
     column, words, codes = found
     listed = phrase("devices", devices=list(zip(words, np.bincount(codes, minlength=len(words)), strict=True)))
-    if choice.instance is None:
+    if options.instance is None:
         raise ReadError(
             f"{table.path}: column {table.label(column)} identifies {len(words)} devices: {listed}; read one of them "
             f"with --instance {words[0]}."
         )
-    if choice.instance not in words:
+    if options.instance not in words:
         raise ReadError(
-            f"{table.path}: there is no instance {choice.instance}; column {table.label(column)} has {listed}."
+            f"{table.path}: there is no instance {options.instance}; column {table.label(column)} has {listed}."
         )
-    rows = np.flatnonzero(codes == words.index(choice.instance)).astype(np.int64)
-    note = chosen(phrase("column", column=table.label(column)), choice.instance, listed, table.n_rows - len(rows))
+    rows = np.flatnonzero(codes == words.index(options.instance)).astype(np.int64)
+    note = chosen(phrase("column", column=table.label(column)), options.instance, listed, table.n_rows - len(rows))
     return table.take(rows, table.n_in_file, note)
 
 

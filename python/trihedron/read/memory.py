@@ -71,19 +71,16 @@ def rows_that_fit(left: int, n_columns: int) -> int:
     return max(left - KEPT_FREE, 0) // (n_columns * BYTES_PER_CELL_AT_PEAK)
 
 
-def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None, n_held: int = 0) -> None:
+def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None) -> None:
     """Reject a log that does not fit into memory.
 
-    Raises ``ReadError`` when ``n_rows * n_columns * 16`` bytes, less 8 for every cell of the ``n_held`` rows already
-    read, exceed the available memory; the message says how many rows fit.
+    Raises ``ReadError`` when ``n_rows * n_columns * 16`` bytes exceed the available memory; the message says how many
+    rows fit.
     """
     left = available_memory_bytes() if available is None else available
-    if left is None:
-        return
     needed = n_rows * n_columns * BYTES_PER_CELL_AT_PEAK
-    room = max(left - KEPT_FREE, 0) + 8 * n_held * n_columns
-    if needed > room:
-        fits = room // (n_columns * BYTES_PER_CELL_AT_PEAK)
+    if left is not None and needed > max(left - KEPT_FREE, 0):
+        fits = rows_that_fit(left, n_columns)
         how = f"about {fits:.2g} rows would fit" if fits >= 1000 else "it does not fit at all"
         raise ReadError(
             f"{path}: about {n_rows:.3g} rows of {n_columns} columns need {needed / 1e9:.1f} GB of memory and there "
@@ -91,29 +88,22 @@ def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None 
         )
 
 
-def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
-    """Reject a malicious archive.
+def check_unpacked(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
+    """Reject a malicious archive, or content that does not fit into memory.
 
-    Raises ``ReadError`` when ``unpacked`` is more than 500 times ``packed`` (both in bytes), and more than 100 MB.
+    Raises ``ReadError`` when ``unpacked`` is more than 500 times ``packed`` (both in bytes) and more than 100 MB, or
+    exceeds the available memory.
     """
     if unpacked > RATIO_MATTERS_FROM and unpacked > MOST_RATIO * max(packed, 1):
         raise ReadError(
             f"{path}: {what} unpacks to {unpacked / 1e6:.0f} MB or more from {packed / 1e6:.2g} MB, which no log does; "
             "unpack it yourself if you trust it."
         )
-
-
-def check_unpacked(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
-    """Reject a malicious archive, or one whose content does not fit into memory.
-
-    Raises ``ReadError`` as :func:`check_ratio`, or when ``unpacked`` bytes exceed the available memory.
-    """
-    check_ratio(path, packed, unpacked, what)
     left = available_memory_bytes()
     if left is not None and unpacked > max(left - KEPT_FREE, 0):
         raise ReadError(
-            f"{path}: {what} unpacks to {unpacked / 1e9:.1f} GB and there are {left / 1e9:.1f} GB of memory left; "
-            "unpack it and cut it into parts."
+            f"{path}: {what} has {unpacked / 1e9:.1f} GB, unpacked, and there are {left / 1e9:.1f} GB of memory left; "
+            "cut it into parts."
         )
 
 

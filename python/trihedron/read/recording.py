@@ -22,15 +22,15 @@ from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
 from trihedron.read.columns import Sensor, Triad
-from trihedron.read.devices import Choice, by_sensor, one_beside
+from trihedron.read.devices import by_sensor, one_beside
 from trihedron.read.errors import ReadError, errors_of_system
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
 from trihedron.read.merge import merge_sensors
 from trihedron.read.sensing import WHOLE, Judged, judge_accelerometer, judge_gyroscope
-from trihedron.read.sensors import Options, Sensors, sensors_of, settled
+from trihedron.read.sensors import Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
-from trihedron.read.table import Table
+from trihedron.read.table import Options
 from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
@@ -67,53 +67,40 @@ def read_recording(
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and 0 < rate_hz < 1e7):
         raise ReadError(f"the rate must be a positive number of samples per second, got {rate_hz}.")
-    choice = Choice(topic, None if instance is None else str(instance))
-    options = Options(columns, rate_hz, time_unit, choice, progress)
-    if path is not None and (accelerometer_path is not None or gyroscope_path is not None):
+    options = Options(columns, rate_hz, time_unit, topic, None if instance is None else str(instance), progress)
+    named: tuple[tuple[Any, Sensor | None], ...]
+    named = ((path, None), (accelerometer_path, "accelerometer"), (gyroscope_path, "gyroscope"))
+    logs = [(log, sensor) for log, sensor in named if log is not None]
+    if path is not None and len(logs) > 1:
         raise ReadError("give one log, or one file per sensor (--accel FILE --gyro FILE).")
-    if path is not None:
-        if isinstance(path, str | os.PathLike):
-            sensors = _of_file(Path(path), None, options)
-            source = str(path)
-        else:
-            sensors = of_tables(by_sensor(table_of(path)), None, options)
-            source = "memory"
-        sha256 = sensors.table.sha256
-    elif accelerometer_path is not None and gyroscope_path is not None:
-        accelerometer = _of_file(Path(accelerometer_path), "accelerometer", options)
-        gyroscope = _of_file(Path(gyroscope_path), "gyroscope", options)
-        sensors = merge_sensors(accelerometer, gyroscope)
-        source = f"{accelerometer_path} + {gyroscope_path}"
-        sha256 = hashlib.sha256((accelerometer.table.sha256 + gyroscope.table.sha256).encode()).hexdigest()
-    elif accelerometer_path is not None or gyroscope_path is not None:
-        only: Sensor = "accelerometer" if accelerometer_path is not None else "gyroscope"
-        one = Path(accelerometer_path if accelerometer_path is not None else gyroscope_path or "")
-        sensors = _of_file(one, only, options)
-        source, sha256 = str(one), sensors.table.sha256
-    else:
+    if not logs:
         raise ReadError("no log was named; give a file, or one file per sensor.")
-    return audited(sensors, source, sha256, accelerometer_unit, gyroscope_unit, progress)
+    each = [_of_log(log, sensor, options) for log, sensor in logs]
+    source = " + ".join(str(log) if isinstance(log, str | os.PathLike) else "memory" for log, _ in logs)
+    digests = "".join(one.table.sha256 for one in each)
+    sha256 = digests if len(each) == 1 else hashlib.sha256(digests.encode()).hexdigest()
+    sensors = each[0] if len(each) == 1 else merge_sensors(*each)
+    return _audited(sensors, source, sha256, (accelerometer_unit, gyroscope_unit), progress)
 
 
-def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
-    # Errors before a format's reader is called: a name that is too long, a folder without permission.
-    with errors_of_system(path):
-        tables = read_tables(path, options.choice, options.progress)
-    return of_tables(tables, sensor, options)
-
-
-def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:
-    """The sensors of one table, of two tables (accelerometer, gyro) merged, or of that of two for ``sensor``."""
+def _of_log(log: Any, sensor: Sensor | None, options: Options) -> Sensors:
+    """The sensors of a file or of data in memory: of one table, or of two (accelerometer, gyro) merged; only
+    ``sensor``, if given."""
+    if isinstance(log, str | os.PathLike):
+        # Errors before a format's reader is called: a name that is too long, a folder without permission.
+        with errors_of_system(Path(log)):
+            tables = read_tables(Path(log), options)
+    else:
+        tables = by_sensor(table_of(log))
     if len(tables) == 1 and options.columns is None and not tables[0].is_chosen:
-        tables = (one_beside(tables[0], options.choice.instance),)
+        tables = (one_beside(tables[0], options.instance),)
     if len(tables) == 1:
         tables = by_rows(tables[0], options.columns, sensor)
     if len(tables) == 1:
         return sensors_of(tables[0], sensor, options)
     if sensor is not None:
         return sensors_of(next(table for table in tables if table.sensor == sensor), sensor, options)
-    accelerometer, gyroscope = (sensors_of(table, table.sensor, options) for table in tables)
-    return merge_sensors(accelerometer, gyroscope)
+    return merge_sensors(*(sensors_of(table, table.sensor, options) for table in tables))
 
 
 def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
@@ -132,15 +119,14 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
         )
 
 
-def audited(
+def _audited(
     sensors: Sensors,
     source: str,
     sha256: str,
-    accelerometer_unit: str | AccelerationUnit | None,
-    gyroscope_unit: str | RateUnit | None,
+    units: tuple[str | AccelerationUnit | None, str | RateUnit | None],
     progress: Progress | None,
 ) -> Recording:
-    """The recording, with units determined, clock and readings audited, and all rows accounted for."""
+    """The recording, with units determined (or as given), clock and readings audited, and all rows accounted for."""
     sensors = settled(sensors)
     rate = _rate_hz(sensors)
     of_clock = audit_timing(sensors, rate) + audit_pace(sensors) if sensors.has_clock else []
@@ -156,13 +142,11 @@ def audited(
     windows = look(present, rate)
     acc_unit, gyr_unit = AccelerationUnit.M_S2, RateUnit.RAD_S
     if sensors.accelerometer is not None:
-        judged = judge_accelerometer(
-            sensors.accelerometer, windows, sensors.columns.accelerometer_unit, accelerometer_unit
-        )
+        judged = judge_accelerometer(sensors.accelerometer, windows, sensors.columns.accelerometer_unit, units[0])
         acc_unit = AccelerationUnit(judged.unit)
         findings += [*judged.findings, *_unnamed_gyro(sensors, rate)]
     if sensors.gyroscope is not None:
-        judged = _judged_gyro(sensors, rate, windows, gyroscope_unit, extremes["gyroscope"])
+        judged = _judged_gyro(sensors, rate, windows, units[1], extremes["gyroscope"])
         gyr_unit = RateUnit(judged.unit)
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
     changes = audit_orientation(sensors, rate)

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -67,33 +67,40 @@ def judge_accelerometer(
 ) -> Judged:
     """Unit of the accelerometer: as given, else as named, else from |a| in quiet windows."""
     norm = static_norm(readings, windows)
-    whole = is_integer(readings) or named == WHOLE
-    named = "" if named == WHOLE else named
-    if given is not None or named not in {"", "raw"}:
-        unit = parse_unit(AccelerationUnit, given if given is not None else named)
-        against = _contradiction_accelerometer(unit, norm, is_given=given is not None)
-        return Judged(unit, _stated("accelerometer", unit, against, is_given=given is not None))
-    if whole and not _is_near(norm, 1.0):
-        found = AccelerationUnit.COUNTS
+    stated = _stated(AccelerationUnit, named, given)
+    fitting = _of_gravity(norm)
+    if stated is not None:
+        gravities = norm * (acceleration_to_si(stated) or math.nan) / STANDARD_GRAVITY_M_S2
+        if not (gravities < 0.6 or gravities > 1.5):
+            return Judged(stated, (_statement("accelerometer", stated, given),))
+        against = Finding.of(
+            FindingCode.UNIT_CONTRADICTED,
+            "accelerometer",
+            unit=stated.value,
+            has_fitting=fitting is not None,
+            fitting="" if fitting is None else fitting.value,
+            is_given=given is not None,
+            static_norm=norm,
+            gravities=gravities,
+        )
+        return Judged(stated, (against,))
+
+    def said(unit: AccelerationUnit, code: FindingCode, case: str = "") -> Judged:
+        return Judged(unit, (Finding.of(code, case, static_norm=norm, unit=unit.value),))
+
+    is_whole = is_integer(readings) or named == WHOLE
+    if is_whole and fitting is not AccelerationUnit.G:
         if _is_near(norm, 1000.0):
-            return Judged(found, (_alike(found, norm, is_whole=True),))
-        return Judged(found, (Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm),))
-    nearest = _of_gravity(norm)
-    if nearest is not None:
+            return said(AccelerationUnit.COUNTS, FindingCode.UNIT_ASSUMED, "counts-or-mg")
+        return said(AccelerationUnit.COUNTS, FindingCode.UNIT_DETECTED, "accelerometer-counts")
+    if fitting is AccelerationUnit.CM_S2 or abs(norm / _GRAVITY[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL:
         # A usual scale error makes mg and cm/s^2 indistinguishable.
-        is_alike = nearest is AccelerationUnit.CM_S2 or abs(norm / _GRAVITY[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
-        if is_alike:
-            return Judged(nearest, (_alike(nearest, norm, is_whole=False),))
-        told = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", static_norm=norm, unit=nearest.value)
-        return Judged(nearest, (told,))
-    if norm < 1.0 and not whole:
-        return Judged(AccelerationUnit.M_S2, (Finding.of(FindingCode.GRAVITY_MISSING, static_norm=norm),))
-    found = Finding.of(FindingCode.UNIT_ASSUMED, "no-gravity", is_seen=not math.isnan(norm), static_norm=norm)
-    return Judged(AccelerationUnit.COUNTS, (found,))
-
-
-def _alike(unit: AccelerationUnit, norm: float, *, is_whole: bool) -> Finding:
-    return Finding.of(FindingCode.UNIT_ASSUMED, "alike", static_norm=norm, unit=unit.value, is_whole=is_whole)
+        return said(fitting or AccelerationUnit.CM_S2, FindingCode.UNIT_ASSUMED, "mg-or-gal")
+    if fitting is not None:
+        return said(fitting, FindingCode.UNIT_DETECTED, "accelerometer-static")
+    if norm < 1.0 and not is_whole:
+        return said(AccelerationUnit.M_S2, FindingCode.GRAVITY_MISSING)
+    return said(AccelerationUnit.COUNTS, FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity")
 
 
 _GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
@@ -102,7 +109,7 @@ _GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si
 
 def _of_gravity(norm: float) -> AccelerationUnit | None:
     """The unit in which a static norm is gravity; ``None`` where it is in none."""
-    nearest = min(_GRAVITY, key=lambda unit: abs(norm - _GRAVITY[unit]) if math.isfinite(norm) else 0.0)
+    nearest = min(_GRAVITY, key=lambda unit: abs(norm - _GRAVITY[unit]))
     return nearest if _is_near(norm, _GRAVITY[nearest]) else None
 
 
@@ -110,32 +117,15 @@ def _is_near(value: float, target: float) -> bool:
     return abs(value - target) <= NEAR_GRAVITY * target
 
 
-def _contradiction_accelerometer(unit: AccelerationUnit, norm: float, *, is_given: bool) -> Finding | None:
-    scale = acceleration_to_si(unit)
-    if scale is None or not math.isfinite(norm):
-        return None
-    si = norm * scale
-    if 0.6 * STANDARD_GRAVITY_M_S2 <= si <= 1.5 * STANDARD_GRAVITY_M_S2:
-        return None
-    fitting = _of_gravity(norm)
-    return Finding.of(
-        FindingCode.UNIT_CONTRADICTED,
-        "accelerometer",
-        unit=unit.value,
-        has_fitting=fitting is not None,
-        fitting="" if fitting is None else fitting.value,
-        is_given=is_given,
-        static_norm=norm,
-        gravities=si / STANDARD_GRAVITY_M_S2,
-    )
+def _stated(kind: type[Unit], named: str, given: str | Unit | None) -> Unit | None:
+    """The unit that is given, else named; None where neither states one."""
+    said = named if given is None else given
+    return None if given is None and named in {"", "raw", WHOLE} else parse_unit(kind, said)
 
 
-def _stated(
-    sensor: str, unit: AccelerationUnit | RateUnit, against: Finding | None, *, is_given: bool
-) -> tuple[Finding, ...]:
-    if against is not None:
-        return (against,)
-    return (Finding.of(FindingCode.UNIT_DETECTED, "stated", sensor=sensor, unit=unit.value, is_given=is_given),)
+def _statement(sensor: str, unit: AccelerationUnit | RateUnit, given: object) -> Finding:
+    is_given = given is not None
+    return Finding.of(FindingCode.UNIT_DETECTED, "stated", sensor=sensor, unit=unit.value, is_given=is_given)
 
 
 def judge_gyroscope(
@@ -147,52 +137,28 @@ def judge_gyroscope(
     extremes: Extremes,
 ) -> Judged:
     """Unit of the gyro: as given, named, by the rotation of gravity (``turning``), or by magnitude (a warning)."""
-    whole = is_integer(readings) or named == WHOLE
-    named = "" if named == WHOLE else named
-    if given is not None or named not in {"", "raw"}:
-        unit = parse_unit(RateUnit, given if given is not None else named)
-        against = None
-        if unit is not RateUnit.COUNTS and turning is not None and not turning.fits(unit):
-            fitting = next((one for one in turning.candidates if turning.fits(one)), None)
-            against = Finding.of(
-                FindingCode.UNIT_CONTRADICTED,
-                "gyro-by-turning",
-                has_fitting=fitting is not None,
-                fitting="" if fitting is None else fitting.value,
-                is_given=given is not None,
-                unit=unit.value,
-                factor=turning.factor(unit),
-                right_hz=turning.rate_hz / turning.factor(unit),
-                percent=turning.percent,
-                correlation=turning.correlation,
-            )
-        return Judged(unit, _stated("gyro", unit, against, is_given=given is not None))
-    if whole:
+    stated = _stated(RateUnit, named, given)
+    if stated is None and (is_integer(readings) or named == WHOLE):
         return Judged(RateUnit.COUNTS, (Finding.of(FindingCode.UNIT_DETECTED, "gyro-counts"),))
+    if stated is not None and (turning is None or stated is RateUnit.COUNTS):
+        return Judged(stated, (_statement("gyro", stated, given),))
     if turning is None:
         return _gyroscope_by_magnitude(extremes, windows)
-    unit = min(turning.candidates, key=lambda unit: abs(math.log(turning.factor(unit))))
-    factor, percent, correlation = turning.factor(unit), turning.percent, turning.correlation
+    nearest = min(turning.candidates, key=lambda one: abs(math.log(turning.factor(one))))
+    unit = nearest if stated is None else stated
+    factor = turning.factor(unit)
+    seen: dict[str, Any] = {"unit": unit.value, "factor": factor}
+    seen |= {"percent": turning.percent, "correlation": turning.correlation}
     if turning.fits(unit):
-        told = Finding.of(
-            FindingCode.UNIT_DETECTED,
-            "gyro-by-turning",
-            unit=unit.value,
-            factor=factor,
-            percent=percent,
-            correlation=correlation,
-        )
-    else:
-        told = Finding.of(
-            FindingCode.UNIT_CONTRADICTED,
-            "gyro-no-unit",
-            unit=unit.value,
-            factor=factor,
-            right_hz=turning.rate_hz / factor,
-            percent=percent,
-            correlation=correlation,
-        )
-    return Judged(unit, (told,))
+        found = Finding.of(FindingCode.UNIT_DETECTED, "gyro-by-turning", **seen)
+        return Judged(unit, (found if stated is None else _statement("gyro", unit, given),))
+    seen["right_hz"] = turning.rate_hz / factor
+    if stated is None:
+        return Judged(unit, (Finding.of(FindingCode.UNIT_CONTRADICTED, "gyro-no-unit", **seen),))
+    fitting = next((one for one in turning.candidates if turning.fits(one)), None)
+    seen |= {"has_fitting": fitting is not None, "fitting": fitting.value if fitting else ""}
+    against = Finding.of(FindingCode.UNIT_CONTRADICTED, "gyro-by-turning", is_given=given is not None, **seen)
+    return Judged(unit, (against,))
 
 
 def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:

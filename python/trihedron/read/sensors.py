@@ -15,14 +15,13 @@ from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
-from trihedron.read.devices import Choice, one_device
+from trihedron.read.devices import one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
 from trihedron.read.sensing import order_of_triads
-from trihedron.read.table import Table
+from trihedron.read.table import Options, Table
 from trihedron.read.time_column import reject_unread_time, summed_steps, with_arrivals
 from trihedron.records import Finding, FindingCode, Sampling, Severity
-from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
 from trihedron.records.words import Words, words
 
@@ -32,15 +31,6 @@ FEWEST_ROWS = 2
 WITNESS_ROWS = 200_000
 LONGEST_MTI_STEP = 5000.0
 """Steps of 100 µs between samples at 2 Hz, below an MTi's usual rates; a DOT's samples are at least 8333 µs apart."""
-
-
-@dataclass(frozen=True)
-class Options:
-    columns: str | None
-    rate_hz: float | None
-    time_unit: str | None
-    choice: Choice
-    progress: Progress | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +107,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     path = table.path
     chosen = find_columns(table, options.columns, sensor or table.sensor)
     if not table.is_chosen:
-        table = one_device(table, options.choice, chosen)
+        table = one_device(table, options, chosen)
     if table.n_rows < 2:
         raise ReadError(
             f"{path}: the file contains one row of numbers only ({table.place(0)}); a recording needs many."

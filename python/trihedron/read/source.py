@@ -6,13 +6,12 @@ from pathlib import Path
 
 from trihedron.read.archive import read_npy
 from trihedron.read.binary import read_binary, ros
-from trihedron.read.devices import Choice, by_sensor
+from trihedron.read.devices import by_sensor
 from trihedron.read.errors import ReadError, check_readable, errors_of_system, first_bytes
 from trihedron.read.kitti import oxts_folder, read_kitti
 from trihedron.read.memory import check_unpacked
-from trihedron.read.table import Table
+from trihedron.read.table import Options, Table
 from trihedron.read.zipped import read_zip
-from trihedron.records.progress import Progress
 
 _CSV = "export it as CSV or Parquet"
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
@@ -61,19 +60,19 @@ def read_table(path: Path) -> Table:
 
     Raises ``ReadError`` when the file cannot be read, is not a log, or contains one table per sensor.
     """
-    tables = read_tables(path, Choice())
+    tables = read_tables(path, Options())
     if len(tables) > 1:
         raise ReadError(f"{path}: the file contains one table per sensor, and one table is wanted here.")
     return tables[0]
 
 
-def read_tables(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
+def read_tables(path: Path, options: Options) -> tuple[Table, ...]:
     """One table, or the accelerometer's and the gyro's (in this order) where each has its own clock.
 
     Raises ``ReadError`` when the file cannot be read or is not a log, or contains several devices and none is chosen.
     """
     if path.is_dir() and (path / "metadata.yaml").is_file():
-        return ros.read(path, choice, progress)
+        return ros.read(path, options)
     if path.is_dir() and (oxts := oxts_folder(path)) is not None:
         return (read_kitti(oxts),)
     size = check_readable(path)
@@ -81,8 +80,8 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if magic.startswith(b"\x93NUMPY"):
         return (read_npy(path),)
     if magic.startswith(b"PK\x03\x04"):
-        return read_zip(path, choice, progress)
-    known = read_binary(path, magic, choice, progress)
+        return read_zip(path, options)
+    known = read_binary(path, magic, options)
     if known is not None:
         return known
     reject_foreign(path, magic)
@@ -93,5 +92,5 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     check_unpacked(path, size, size)
     with errors_of_system(path), path.open("rb") as stream:
         data = stream.read()
-    tables = read_text(path, unpacked(path, data), hashlib.sha256(data).hexdigest(), progress)
+    tables = read_text(path, unpacked(path, data), hashlib.sha256(data).hexdigest(), options.progress)
     return by_sensor(tables[0]) if len(tables) == 1 else tables

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from trihedron.read.devices import Choice, chosen
+from trihedron.read.devices import chosen
 from trihedron.read.errors import ReadError
+from trihedron.read.table import Options
 from trihedron.records import Finding
 from trihedron.records.words import Words, words
 
@@ -33,7 +34,7 @@ def listed(streams: list[Stream]) -> Words:
     return words("streams", streams=named, has_more=len(streams) > MOST_LISTED)
 
 
-def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream:
+def pick(path: Path, streams: list[Stream], options: Options, what: str) -> Stream:
     """The chosen stream, or the only one.
 
     Raises ``ReadError`` when there is no stream, none or several match the choice, or the matching one is empty.
@@ -43,11 +44,11 @@ def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream
     fitting = [
         s
         for s in streams
-        if (choice.topic is None or s.topic.strip("/") == choice.topic.strip("/"))
-        and (choice.instance is None or s.instance == choice.instance)
+        if (options.topic is None or s.topic.strip("/") == options.topic.strip("/"))
+        and (options.instance is None or s.instance == options.instance)
     ]
     if not fitting:
-        asked = (("topic", choice.topic), ("instance", choice.instance))
+        asked = (("topic", options.topic), ("instance", options.instance))
         wanted = " and ".join(f"{kind} {word}" for kind, word in asked if word)
         raise ReadError(f"{path}: there is no {wanted} in {what}; it offers {listed(streams)}.")
     filled = [s for s in fitting if s.count]

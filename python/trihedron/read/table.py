@@ -10,7 +10,21 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records import Finding, Onboard
+from trihedron.records.progress import Progress
 from trihedron.records.words import Words, words
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user states of a log: see ``trihedron.read``; ``topic`` and ``instance`` choose among several logs in a
+    file."""
+
+    columns: str | None = None
+    rate_hz: float | None = None
+    time_unit: str | None = None
+    topic: str | None = None
+    instance: str | None = None
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True)

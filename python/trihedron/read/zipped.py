@@ -7,11 +7,11 @@ from pathlib import Path, PurePosixPath
 
 from trihedron.read.archive import read_npz
 from trihedron.read.columns import SENSORS, sensor_of_file_name
-from trihedron.read.devices import Choice, by_sensor
+from trihedron.read.devices import by_sensor
 from trihedron.read.errors import ReadError, errors_of_library, errors_of_system, file_sha256
 from trihedron.read.memory import check_unpacked
 from trihedron.read.names import sensor_said
-from trihedron.read.table import Table
+from trihedron.read.table import Options, Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
@@ -19,7 +19,7 @@ _OF_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, Run
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
 
 
-def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
+def read_zip(path: Path, options: Options) -> tuple[Table, ...]:
     """Tables of a zip: a NumPy archive, one text file, or the accelerometer's and the gyro's.
 
     Raises ``ReadError`` when the archive is damaged, is another program's container, or it is ambiguous which members
@@ -29,17 +29,21 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
     with damage, errors_of_system(path), zipfile.ZipFile(path) as archive:
         names = [info.filename for info in archive.infolist() if not info.is_dir()]
         if not names or any(name.endswith(".npy") for name in names):
-            return (read_npz(path, choice.instance),)
+            return (read_npz(path, options.instance),)
         _reject_containers(path, names)
         members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
-        picked = _chosen(path, members, choice.topic) or _by_name(members)
+        picked = _chosen(path, members, options.topic) or _by_name(members)
         if not picked:
             raise ReadError(
                 f"{path}: a zip with {', '.join(names[:12])}; none of these is a log known by its name: choose one "
                 "with --topic NAME, or unpack it and give --accel and --gyro."
             )
         sha256 = file_sha256(path)
-        tables = [table for name in picked for table in _member(path, archive, name, sha256, progress, len(picked) > 1)]
+        tables = [
+            table
+            for name in picked
+            for table in _member(path, archive, name, sha256, options.progress, len(picked) > 1)
+        ]
     others = [name for name in names if name not in picked]
     if others:
         note = Finding.of(FindingCode.DEVICE_CHOSEN, "archive", members=picked, n_members=len(picked), others=others)

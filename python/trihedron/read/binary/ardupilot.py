@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 
 from trihedron.errors import InputError
-from trihedron.read.devices import Choice
 from trihedron.read.errors import errors_of_library, file_sha256, stderr_without
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
-from trihedron.read.table import StatedClock, Table
+from trihedron.read.table import Options, StatedClock, Table
 from trihedron.records import Finding, FindingCode
-from trihedron.records.progress import Progress
 
 STARTS = (b"\xa3\x95",)
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
@@ -31,7 +29,7 @@ _FIELDS = {
 _UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
 
 
-def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
+def read(path: Path, options: Options) -> tuple[Table, ...]:
     """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each with its own timestamps.
 
     Raises ``ReadError`` when pymavlink is not installed, the log is damaged, or contains several IMUs and none is
@@ -67,8 +65,8 @@ def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table,
     imu = [s for s in streams if s.topic == "IMU"]
     raw = [s for s in streams if s.topic == "ACC" and ("GYR", s.instance) in messages]
     streams = imu + raw
-    offered = streams if choice.topic is not None or not imu else imu
-    taken = pick(path, offered, choice, "this log")
+    offered = streams if options.topic is not None or not imu else imu
+    taken = pick(path, offered, options, "this log")
     # Readings of every message, ACC and GYR included, are logged after offset, scale and rotation to the board's axes.
     onboard = held.onboard("ardupilot", (int(taken.instance),) * 2, "body")
     notes = (*choice_note("log", taken, streams), *_skipped(said.getvalue()), *said_of(onboard))

@@ -5,17 +5,15 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError, errors_of_polars, file_sha256, reject_after_fork
 from trihedron.read.memory import check_memory
-from trihedron.read.table import Table
+from trihedron.read.table import Options, Table
 from trihedron.records import Finding, FindingCode
-from trihedron.records.progress import Progress
 
 STARTS = (b"PAR1",)
 
 
-def read(path: Path, _choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
+def read(path: Path, _options: Options) -> tuple[Table, ...]:
     """Numeric and time columns of a Parquet file; other columns are excluded with a finding."""
     reject_after_fork(path)
     # The library for tables is large, and other formats do not need it.

@@ -1,27 +1,31 @@
 """ROS 1 bags, ROS 2 bags (folder, .db3, .mcap): messages of type sensor_msgs/Imu, read by rosbags."""
 
 import tempfile
-from dataclasses import replace
+from array import array
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
-from trihedron.read.devices import Choice
+from trihedron.arrays import AXES, FloatArray
+from trihedron.read.columns import Sensor, sensor_of_file_name
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_bytes
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
-from trihedron.read.table import Table
+from trihedron.read.table import Options, Table
 from trihedron.records.progress import Progress
 
 _SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite ": ".db3"}
 STARTS = tuple(_SUFFIXES)
 _IMU = "sensor_msgs/msg/Imu"
-_NAMES = ("stamp.secs", "stamp.nsecs", *(f"linear_acceleration.{x} [m/s^2]" for x in "xyz"))
-_ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "received")
+_NAMES = (
+    *("stamp.secs", "stamp.nsecs"),
+    *(f"linear_acceleration.{x} [m/s^2]" for x in AXES),
+    *(f"angular_velocity.{x} [rad/s]" for x in AXES),
+    "received",
+)
 
 
-def read(path: Path, choice: Choice, progress: Progress | None) -> tuple[Table, ...]:
+def read(path: Path, options: Options) -> tuple[Table, ...]:
     """The messages of one topic, or of an accelerometer's and a gyro's topic, with the timestamps of their headers.
 
     Raises ``ReadError`` when rosbags is not installed, the bag is damaged, or it is ambiguous which topic to read.
@@ -43,10 +47,10 @@ def read(path: Path, choice: Choice, progress: Progress | None) -> tuple[Table, 
             errors_of_library(path, "rosbags cannot read this bag ({}); reindex or copy it again"),
             AnyReader([named], default_typestore=get_typestore(Stores.LATEST)) as reader,
         ):
-            return _tables(path, reader, choice, progress)
+            return _tables(path, reader, options)
 
 
-def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) -> tuple[Table, ...]:
+def _tables(path: Path, reader: Any, options: Options) -> tuple[Table, ...]:
     counts: dict[str, int] = {}
     others: list[str] = []
     for connection in reader.connections:
@@ -60,53 +64,49 @@ def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) 
             f"{path}: no topic of type sensor_msgs/Imu in this bag; there are {', '.join(others[:12]) or '0 messages'}."
         )
     sha256 = file_sha256(path) if path.is_file() else ""
-    pair = _pair(streams) if choice.topic is None else None
-    if pair is not None:
-        acc, gyr = (_table(path, reader, s, streams, sha256, progress) for s in pair)
-        return _without(acc, "accelerometer", "angular"), _without(gyr, "gyroscope", "linear")
-    return (_table(path, reader, pick(path, streams, choice, "this bag"), streams, sha256, progress),)
+    taken = _pair(streams) if options.topic is None else {}
+    taken = taken or {None: pick(path, streams, options, "this bag")}
+    tables = []
+    for sensor, stream in taken.items():
+        names, columns = _columns(path, reader, stream, sensor, options.progress)
+        note = choice_note("bag", stream, streams)
+        tables.append(Table(path, names, columns, sha256, findings=note, sensor=sensor, is_chosen=True))
+    return tuple(tables)
 
 
-def _pair(streams: list[Stream]) -> tuple[Stream, Stream] | None:
+def _pair(streams: list[Stream]) -> dict[Sensor | None, Stream]:
     """Two topics of a camera that logs each sensor separately, such as RealSense's /camera/accel and /camera/gyro."""
-    acc = [s for s in streams if "acc" in s.topic.lower() and "gyr" not in s.topic.lower() and s.count]
-    gyr = [s for s in streams if "gyr" in s.topic.lower() and "acc" not in s.topic.lower() and s.count]
-    return (acc[0], gyr[0]) if len(acc) == len(gyr) == 1 and len([s for s in streams if s.count]) == 2 else None
+    filled = [s for s in streams if s.count]
+    found = {sensor_of_file_name(s.topic): s for s in sorted(filled, key=lambda s: sensor_of_file_name(s.topic) or "")}
+    return found if len(filled) == len(found) == 2 and None not in found else {}
 
 
-def _without(table: Table, sensor: Any, dropped: str) -> Table:
-    pairs = zip(table.names or (), table.columns, strict=True)
-    names, columns = zip(*(pair for pair in pairs if not pair[0].startswith(dropped)), strict=True)
-    return replace(table, sensor=sensor, names=names, columns=columns)
-
-
-def _table(
-    path: Path, reader: Any, stream: Stream, streams: list[Stream], sha256: str, progress: Progress | None
-) -> Table:
+def _columns(
+    path: Path, reader: Any, stream: Stream, sensor: Sensor | None, progress: Progress | None
+) -> tuple[tuple[str, ...], tuple[FloatArray, ...]]:
+    """Names and columns of the messages of a topic; only those of ``sensor``, if given."""
     wanted = [c for c in reader.connections if c.topic == stream.topic and c.msgtype == _IMU]
-    rows: FloatArray = np.empty((stream.count, len(_ALL_NAMES)))
-    n = 0
-    start = None
+    cells = array("d")
+    n, start = 0, None
     for connection, received, raw in reader.messages(connections=wanted):
         message = reader.deserialize(raw, connection.msgtype)
         stamp, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
         start = received if start is None else start
-        values = (stamp.sec, stamp.nanosec, a.x, a.y, a.z, w.x, w.y, w.z, (received - start) * 1e-9)
-        if n == len(rows):
-            rows = np.concatenate([rows, np.empty_like(rows)])
-        rows[n] = values
+        cells.extend((stamp.sec, stamp.nanosec, a.x, a.y, a.z, w.x, w.y, w.z, (received - start) * 1e-9))
         n += 1
         if progress is not None and n % 20000 == 0:
             progress(n / stream.count, f"reading {stream.topic}: {n} messages")
     if n < stream.count:
         raise ReadError(f"{path}: the index of this bag promises {stream.count} messages on {stream.topic}, {n} came.")
-    if n == 0:
+    if not n:
         raise ReadError(f"{path}: 0 messages on {stream.topic}; the sensor was not recorded.")
-    rows = rows[:n]
-    names, columns = list(_ALL_NAMES), [np.ascontiguousarray(rows[:, k]) for k in range(len(_ALL_NAMES))]
-    if not np.any(rows[:, 0] != 0) and not np.any(rows[:, 1] != 0):
+    named = dict(zip(_NAMES, np.array(cells).reshape(n, -1).T.copy(), strict=True))
+    received_s = named.pop("received")
+    if not named["stamp.secs"].any() and not named["stamp.nsecs"].any():
         # No timestamps in the headers: those of the recording program are used.
-        names, columns = ["time [s]", *names[2:8]], [columns[8], *columns[2:8]]
-    return Table(
-        path, tuple(names), tuple(columns), sha256, findings=choice_note("bag", stream, streams), is_chosen=True
-    )
+        named = {"time [s]": received_s} | {name: v for name, v in named.items() if not name.startswith("stamp")}
+    else:
+        named["received"] = received_s
+    dropped = {"accelerometer": "angular", "gyroscope": "linear"}.get(sensor or "", "-")
+    named = {name: values for name, values in named.items() if not name.startswith(dropped)}
+    return tuple(named), tuple(named.values())

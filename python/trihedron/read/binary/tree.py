@@ -18,28 +18,26 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.columns import columns_or_none, sensor_of_file_name
-from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_bytes, first_line
 from trihedron.read.memory import columns_table, frame_columns
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
-from trihedron.read.table import Table
-from trihedron.records.progress import Progress
+from trihedron.read.table import Options, Table
 
 STARTS = (b"\x89HDF", b"MATLAB")
 Groups = dict[str, dict[str, npt.NDArray[Any]]]
 MIN_ROWS = 8
 
 
-def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
+def read(path: Path, options: Options) -> tuple[Table, ...]:
     """The log of an HDF5 or MATLAB file, as :func:`_read_hdf5` and :func:`_read_matlab`."""
     first = first_bytes(path, 126)
     # Bytes 125 and 126 of a MATLAB file state whether HDF5 follows, whatever text precedes them.
     is_hdf5_inside = first[124:126] in (b"\x00\x02", b"\x02\x00") or first.startswith(b"MATLAB 7.3")
     is_matlab = first.startswith(b"MATLAB") and not is_hdf5_inside
-    return (_read_matlab if is_matlab else _read_hdf5)(path, choice)
+    return (_read_matlab if is_matlab else _read_hdf5)(path, options)
 
 
-def _read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
+def _read_hdf5(path: Path, options: Options) -> tuple[Table, ...]:
     """The log of an HDF5 or MATLAB 7.3 file; two tables where MATLAB saved one for each sensor.
 
     Raises ``ReadError`` when h5py is not installed, the file is damaged, or it is ambiguous which group to read.
@@ -61,8 +59,8 @@ def _read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
         has_objects = "#subsystem#" in file
         file.visititems(visit)
     if has_objects and not _tables(path, groups):
-        return _objects(path, choice)
-    return (_of_groups(path, groups, choice, "this HDF5 file"),)
+        return _objects(path, options)
+    return (_of_groups(path, groups, options, "this HDF5 file"),)
 
 
 _LOAD = """
@@ -74,7 +72,7 @@ pickle.dump(loadmat(sys.argv[1], simplify_cells=True), sys.stdout.buffer, protoc
 """Program that reads a file: SciPy trusts the sizes in it, and a wrong one ends the process in which it is read."""
 
 
-def _read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
+def _read_matlab(path: Path, options: Options) -> tuple[Table, ...]:
     """The log of a MATLAB file before version 7.3, read by SciPy; tables and timetables are decoded by mat-io.
 
     Raises ``ReadError`` when the file is damaged, contains only MATLAB objects, or it is ambiguous which structure to
@@ -89,10 +87,10 @@ def _read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     groups: Groups = {}
     _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
     if "__function_workspace__" in content and not _tables(path, groups):
-        return _objects(path, choice)
+        return _objects(path, options)
     if not groups:
         raise ReadError(f"{path}: no arrays of numbers in this MATLAB file.")
-    return (_of_groups(path, groups, choice, "this MATLAB file"),)
+    return (_of_groups(path, groups, options, "this MATLAB file"),)
 
 
 def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
@@ -123,20 +121,20 @@ def _with_sensors(path: Path, named: Mapping[str, list[tuple[str, Any]]]) -> dic
     return by_name or (by_place if len(by_place) == 1 else {})
 
 
-def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
+def _of_groups(path: Path, groups: Groups, options: Options, what: str) -> Table:
     tables = _tables(path, groups)
     if not tables:
         held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
         raise ReadError(
             f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it contains {held[:300]}."
         )
-    return _picked(path, tables, choice, what)
+    return _picked(path, tables, options, what)
 
 
-def _picked(path: Path, tables: dict[str, Table], choice: Choice, what: str) -> Table:
+def _picked(path: Path, tables: dict[str, Table], options: Options, what: str) -> Table:
     """The chosen one of several tables, with a finding that names it."""
     streams = [Stream(name, table.n_rows) for name, table in tables.items()]
-    taken = pick(path, streams, choice, what)
+    taken = pick(path, streams, options, what)
     table, note = tables[taken.topic], choice_note(what.removeprefix("this "), taken, streams)
     return replace(table, sha256=file_sha256(path), findings=(*table.findings, *note))
 
@@ -167,7 +165,7 @@ def _columns(arrays: Mapping[str, npt.NDArray[Any]]) -> list[tuple[str, Any]]:
 _AXES = {"x", "y", "z"}
 
 
-def _objects(path: Path, choice: Choice) -> tuple[Table, ...]:
+def _objects(path: Path, options: Options) -> tuple[Table, ...]:
     """The log in a MATLAB file of tables: one table, or one for each sensor."""
     try:
         from matio import load_from_mat
@@ -185,7 +183,7 @@ def _objects(path: Path, choice: Choice) -> tuple[Table, ...]:
         raise ReadError(
             f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it contains {held[:300]}."
         )
-    if choice.topic is None and len(tables) == 2:
+    if options.topic is None and len(tables) == 2:
         found = {name: columns_or_none(table) for name, table in tables.items()}
         acc = [tables[name] for name, of in found.items() if of and of.accelerometer and not of.gyroscope]
         gyr = [tables[name] for name, of in found.items() if of and of.gyroscope and not of.accelerometer]
@@ -194,7 +192,7 @@ def _objects(path: Path, choice: Choice) -> tuple[Table, ...]:
             return replace(acc[0], sensor="accelerometer", sha256=sha256), replace(
                 gyr[0], sensor="gyroscope", sha256=sha256
             )
-    return (_picked(path, tables, choice, "this MATLAB file"),)
+    return (_picked(path, tables, options, "this MATLAB file"),)
 
 
 def _columns_of_frame(name: str, frame: Any) -> list[tuple[str, Any]]:

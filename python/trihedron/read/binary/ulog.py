@@ -17,14 +17,12 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
-from trihedron.read.table import StatedClock, Table
+from trihedron.read.table import Options, StatedClock, Table
 from trihedron.records import Finding, FindingCode, Onboard
 from trihedron.records.onboard import Stage
-from trihedron.records.progress import Progress
 
 STARTS = (b"ULog",)
 SUFFIX = "_fifo"
@@ -59,7 +57,7 @@ _SENSORS: dict[str, Any] = {_RAW: ("accelerometer", "acc", "m/s^2"), _GYRO: ("gy
 _SKIP = {"timestamp", "timestamp_sample"}
 
 
-def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table, ...]:
+def read(path: Path, options: Options) -> tuple[Table, ...]:
     """The accelerometer's and the gyro's table of one instance, or the one table of ``sensor_combined``.
 
     Raw topics are read if they were logged at full rate (at least half as many rows as ``sensor_combined``), else
@@ -83,12 +81,12 @@ def read(path: Path, choice: Choice, _progress: Progress | None) -> tuple[Table,
     raw, batches = (_pairs(counts, suffix) for suffix in ("", SUFFIX))
     streams = raw + batches + ([Stream(_COMBINED, combined)] if (_COMBINED, 0) in counts else [])
     offered = streams
-    if choice.topic is None:
+    if options.topic is None:
         full = [s for s in raw if s.count >= 0.5 * combined]
         offered = full or batches or [s for s in streams if s.topic == _COMBINED] or raw
-        if choice.instance is not None and not any(s.instance == choice.instance for s in offered):
+        if options.instance is not None and not any(s.instance == options.instance for s in offered):
             offered = streams
-    taken = pick(path, offered, choice, "this log")
+    taken = pick(path, offered, options, "this log")
     onboard = _onboard(log, taken.topic, int(taken.instance or 0))
     findings = (*choice_note("log", taken, streams), *_losses(log), *said_of(onboard))
     clock = StatedClock(time=0, unit="us")

@@ -12,11 +12,10 @@ from scipy.spatial.transform import Rotation
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.base import build_clock
 from trihedron.read.clock.settle import settle_clock
-from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.source import read_tables
-from trihedron.read.table import Table
+from trihedron.read.table import Options, Table
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.reference import ReferenceMotion
 from trihedron.units import RateUnit, acceleration_to_si, rate_to_si
@@ -105,7 +104,7 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
     ReadError
         (a ``ValueError``) the message says in one sentence which file, which row and what to do.
     """
-    table = read_tables(Path(path), Choice())[0]
+    table = read_tables(Path(path), Options())[0]
     roles = roles_of(table, columns)
     times = [role for role in roles if role.what == "time"]
     if not times:
