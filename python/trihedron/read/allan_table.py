@@ -52,10 +52,16 @@ def read_allan_table(path: Path) -> AllanTable:
     values = [i for i, key in enumerate(keys) if _ending(key) and i not in (tau, channel)]
     if not values:
         raise ReadError(f"{path}: no column of Allan deviations among {', '.join(names)}; name it adev or avar.")
-    deviation = np.stack([_deviation(table, i, keys[i]) for i in values], axis=1)
+    with np.errstate(invalid="ignore"):
+        powers = [0.5 if _ending(keys[i]) in _VARIANCE else 1.0 for i in values]
+        columns = [
+            np.where(table.columns[i] > 0.0, table.columns[i], math.nan) ** p
+            for i, p in zip(values, powers, strict=True)
+        ]
+    deviation = np.stack(columns, axis=1)
     stems = [keys[i].removesuffix(_ending(keys[i])).strip("_") for i in values]
     titles = [stem.replace("_", " ") or f"channel {k + 1}" for k, stem in enumerate(stems)]
-    units = [_unit(names[i]) for i in values]
+    units = [found[1].strip() if (found := re.search(r"\[(.*)\]", names[i])) else "" for i in values]
     rate, length = (
         None if (i := _one_of(keys, wanted)) is None else float(table.columns[i][0]) for wanted in (_RATE, _LENGTH)
     )
@@ -89,14 +95,3 @@ def _one_of(keys: list[str], wanted: Iterable[str]) -> int | None:
 def _ending(key: str) -> str:
     """The word for a deviation or a variance with which a name ends; "" for other names."""
     return next((word for word in (*_DEVIATION, *_VARIANCE) if key == word or key.endswith("_" + word)), "")
-
-
-def _deviation(table: Table, column: int, key: str) -> FloatArray:
-    values = table.columns[column]
-    values = np.where(values > 0.0, values, math.nan)
-    return np.sqrt(values) if _ending(key) in _VARIANCE else values
-
-
-def _unit(name: str) -> str:
-    found = re.search(r"\[(.*)\]", name)
-    return found.group(1).strip() if found else ""

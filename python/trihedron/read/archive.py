@@ -106,12 +106,10 @@ def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], instance: str 
     n_rows = max([n for n in lengths if n > 12] or lengths, default=0)
     items: list[tuple[str, Any]] = []
     for name, array in flat.items():
-        if array.ndim == 3 and len(array) == n_rows:
-            check_memory(path, n_rows, array.shape[2])
-            items.append((name, _pick_device(path, name, array, instance)))
-        elif array.ndim and len(array) == n_rows:
-            check_memory(path, n_rows, math.prod(array.shape[1:]))
-            items.append((name, array))
+        if array.ndim and len(array) == n_rows:
+            block = _pick_device(path, name, array, instance) if array.ndim == 3 else array
+            check_memory(path, n_rows, math.prod(block.shape[1:]))
+            items.append((name, block))
         elif array.dtype.kind in "iufb":
             items.append((name, " ".join(f"{value:.12g}" for value in np.ravel(array)[:64].astype(float))))
         elif array.size == 1:

@@ -21,7 +21,7 @@ from trihedron.read.audit.readings import audit_readings, audit_seam, audit_step
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
-from trihedron.read.columns import Sensor, Triad
+from trihedron.read.columns import Sensor
 from trihedron.read.devices import by_sensor, one_beside
 from trihedron.read.errors import ReadError, errors_of_system
 from trihedron.read.in_turn import by_rows
@@ -273,21 +273,27 @@ FEWEST_PAIRS = 50
 
 
 def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
-    """A warning for each triad of columns with unknown names whose readings rotate as the accelerometer's gravity does.
+    """A warning for each triad of columns with unknown names, which differ only in one letter (``x``, ``y``, ``z``),
+    whose readings rotate as the accelerometer's gravity does.
 
     Only where no gyro is recognised; gravity's change in blocks is compared with ``-ω × a`` (``turning_of``).
     """
     accelerometer, table, columns = sensors.accelerometer, sensors.table, sensors.columns
     if accelerometer is None or sensors.gyroscope is not None or columns.accelerometer is None or table.names is None:
         return ()
+    taken = {i for i, c in enumerate(table.columns) if not len(c)} | columns.used()
+    left = {name.strip().lower(): i for i, name in enumerate(table.names) if i not in taken}
     found = []
-    for triad in _triads_of(table.names, {i for i, c in enumerate(table.columns) if not len(c)} | columns.used()):
-        rates = np.stack([sensors.column(column) for column in triad], axis=1)
-        if not _turns_with(accelerometer, rates, rate_hz):
-            continue
-        mapping = replace(columns, gyroscope=triad).mapping()
-        listed = " ".join(table.label(column) for column in triad)
-        found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
+    for name in left:
+        for k in (k for k, letter in enumerate(name) if letter == "x"):
+            x, y, z = (left.get(f"{name[:k]}{axis}{name[k + 1 :]}") for axis in "xyz")
+            if x is None or y is None or z is None:
+                continue
+            rates = np.stack([sensors.column(column) for column in (x, y, z)], axis=1)
+            if _turns_with(accelerometer, rates, rate_hz):
+                listed = " ".join(table.label(column) for column in (x, y, z))
+                mapping = replace(columns, gyroscope=(x, y, z)).mapping()
+                found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
     return tuple(found)
 
 
@@ -295,15 +301,3 @@ def _turns_with(gravity: FloatArray, rates: FloatArray, rate_hz: float) -> bool:
     """Whether a triad (n, 3) turns as gravity does by the rates (n, 3) of another."""
     turning = turning_of(gravity, rates, rate_hz)
     return turning is not None and turning.correlation > CLEAR_CORRELATION and turning.n >= FEWEST_PAIRS
-
-
-def _triads_of(names: tuple[str, ...], taken: set[int]) -> list[Triad]:
-    """Triads of columns whose names differ only in one letter: ``x``, ``y``, ``z``."""
-    left = {name.strip().lower(): i for i, name in enumerate(names) if i not in taken}
-    out: list[Triad] = []
-    for name, i in left.items():
-        for k in (k for k, letter in enumerate(name) if letter == "x"):
-            others = [left.get(f"{name[:k]}{axis}{name[k + 1 :]}") for axis in "yz"]
-            if others[0] is not None and others[1] is not None:
-                out.append((i, others[0], others[1]))
-    return out

@@ -212,40 +212,27 @@ def _stated_rate(table: Table) -> float | None:
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
     is_given = options.rate_hz is not None
     told = options.rate_hz if is_given else _stated_rate(table)
-    if chosen.time is not None:
-        named, given = chosen.time_unit, options.time_unit
-        if told is not None and given is None and named in {"", TICKS} and counts_rows(table.columns[chosen.time]):
-            # A counter of samples named as time: as a clock with one tick per sample it also shows losses.
-            given = f"{told!r} Hz"
-            findings.append(Finding.of(FindingCode.RATE_STATED, rate_hz=told, is_given=is_given))
-        if named == "100us" and not table.clock.unit:
-            named = _sample_time_fine(table, chosen.time, findings)
-        clock = build_clock(
-            with_arrivals(table, chosen.time),
-            chosen.time,
-            named,
-            given,
-            chosen.nanoseconds,
-            _witness(table, chosen),
-        )
-        findings += clock.findings
-        rate = mean_rate_hz(clock.time_s)
-        if told is not None and abs(rate / told - 1.0) > 0.01:
-            findings.append(Finding.of(FindingCode.RATE_CONTRADICTED, given_hz=told, clock_hz=rate))
-        return clock, rate
-    rate = ASSUMED_RATE_HZ if told is None else float(told)
-    if told is not None:
-        findings.append(Finding.of(FindingCode.RATE_STATED, rate_hz=rate, is_given=is_given))
-    else:
-        has_gyro = chosen.gyroscope is not None
-        found = Finding.of(
-            FindingCode.RATE_ASSUMED,
-            severity=Severity.SERIOUS if has_gyro else Severity.WARNING,
-            has_gyro=has_gyro,
-            rate_hz=rate,
-        )
-        findings.append(found)
-    return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
+    stated = [Finding.of(FindingCode.RATE_STATED, rate_hz=told, is_given=is_given)] if told is not None else []
+    if chosen.time is None:
+        rate, has_gyro = told or ASSUMED_RATE_HZ, chosen.gyroscope is not None
+        severity = Severity.SERIOUS if has_gyro else Severity.WARNING
+        assumed = Finding.of(FindingCode.RATE_ASSUMED, severity=severity, has_gyro=has_gyro, rate_hz=rate)
+        findings += stated or [assumed]
+        return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
+    named, given = chosen.time_unit, options.time_unit
+    if told is not None and given is None and named in {"", TICKS} and counts_rows(table.columns[chosen.time]):
+        # A counter of samples named as time: as a clock with one tick per sample it also shows losses.
+        given = f"{told!r} Hz"
+        findings += stated
+    if named == "100us" and not table.clock.unit:
+        named = _sample_time_fine(table, chosen.time, findings)
+    timed = with_arrivals(table, chosen.time)
+    clock = build_clock(timed, chosen.time, named, given, chosen.nanoseconds, _witness(table, chosen))
+    findings += clock.findings
+    rate = mean_rate_hz(clock.time_s)
+    if told is not None and abs(rate / told - 1.0) > 0.01:
+        findings.append(Finding.of(FindingCode.RATE_CONTRADICTED, given_hz=told, clock_hz=rate))
+    return clock, rate
 
 
 def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.columns import columns_or_none, sensor_of_file_name
+from trihedron.read.columns import SENSORS, columns_or_none, sensor_of_file_name
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_bytes, first_line
 from trihedron.read.memory import columns_table, frame_columns
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
@@ -58,9 +58,7 @@ def _read_hdf5(path: Path, options: Options) -> tuple[Table, ...]:
     with errors_of_library(path, "h5py cannot read this file ({}); copy it again"), h5py.File(path, "r") as file:
         has_objects = "#subsystem#" in file
         file.visititems(visit)
-    if has_objects and not _tables(path, groups):
-        return _objects(path, options)
-    return (_of_groups(path, groups, options, "this HDF5 file"),)
+    return _log_of(path, groups, options, "this HDF5 file", has_objects=has_objects)
 
 
 _LOAD = """
@@ -86,11 +84,7 @@ def _read_matlab(path: Path, options: Options) -> tuple[Table, ...]:
         raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({said}); save it again.") from None
     groups: Groups = {}
     _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
-    if "__function_workspace__" in content and not _tables(path, groups):
-        return _objects(path, options)
-    if not groups:
-        raise ReadError(f"{path}: no arrays of numbers in this MATLAB file.")
-    return (_of_groups(path, groups, options, "this MATLAB file"),)
+    return _log_of(path, groups, options, "this MATLAB file", has_objects="__function_workspace__" in content)
 
 
 def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
@@ -101,11 +95,6 @@ def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
             groups.setdefault(name, {})[key] = value
         elif isinstance(value, int | float):
             groups.setdefault(name, {})[key] = np.array(value)
-
-
-def _tables(path: Path, groups: Groups) -> dict[str, Table]:
-    """Groups with an accelerometer or a gyro, by name."""
-    return _with_sensors(path, {name or "/": _columns(arrays) for name, arrays in groups.items()})
 
 
 def _with_sensors(path: Path, named: Mapping[str, list[tuple[str, Any]]]) -> dict[str, Table]:
@@ -121,22 +110,34 @@ def _with_sensors(path: Path, named: Mapping[str, list[tuple[str, Any]]]) -> dic
     return by_name or (by_place if len(by_place) == 1 else {})
 
 
-def _of_groups(path: Path, groups: Groups, options: Options, what: str) -> Table:
-    tables = _tables(path, groups)
+def _log_of(path: Path, groups: Groups, options: Options, what: str, *, has_objects: bool) -> tuple[Table, ...]:
+    """The group or the table (of a file that ``has_objects``) with an accelerometer or a gyro; two with one each."""
+    held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
+    tables = _with_sensors(path, {name or "/": _columns(arrays) for name, arrays in groups.items()})
+    if has_objects and not tables:
+        frames, what = _frames(path), "this MATLAB file"
+        held = ", ".join(f"{name} ({type(value).__name__})" for name, value in frames.items())
+        named = {
+            name: value for name, value in frames.items() if hasattr(value, "columns") and hasattr(value, "dtypes")
+        }
+        tables = _with_sensors(path, {name: _columns_of_frame(name, frame) for name, frame in named.items()})
     if not tables:
-        held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
         raise ReadError(
-            f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it contains {held[:300]}."
+            f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it contains "
+            f"{held[:300] or 'no arrays of numbers'}."
         )
-    return _picked(path, tables, options, what)
-
-
-def _picked(path: Path, tables: dict[str, Table], options: Options, what: str) -> Table:
-    """The chosen one of several tables, with a finding that names it."""
+    sha256 = file_sha256(path)
+    if options.topic is None and len(tables) == 2:
+        found = [(columns_or_none(table), table) for table in tables.values()]
+        by_sensor = {
+            "gyroscope" if of and not of.accelerometer else "accelerometer": table for of, table in found if of
+        }
+        if len(by_sensor) == 2 and not any(of and of.accelerometer and of.gyroscope for of, _ in found):
+            return tuple(replace(by_sensor[sensor], sensor=sensor, sha256=sha256) for sensor in SENSORS)
     streams = [Stream(name, table.n_rows) for name, table in tables.items()]
     taken = pick(path, streams, options, what)
     table, note = tables[taken.topic], choice_note(what.removeprefix("this "), taken, streams)
-    return replace(table, sha256=file_sha256(path), findings=(*table.findings, *note))
+    return (replace(table, sha256=sha256, findings=(*table.findings, *note)),)
 
 
 def _upright(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -165,8 +166,8 @@ def _columns(arrays: Mapping[str, npt.NDArray[Any]]) -> list[tuple[str, Any]]:
 _AXES = {"x", "y", "z"}
 
 
-def _objects(path: Path, options: Options) -> tuple[Table, ...]:
-    """The log in a MATLAB file of tables: one table, or one for each sensor."""
+def _frames(path: Path) -> dict[str, Any]:
+    """Tables and timetables of a MATLAB file as data frames, and its other variables."""
     try:
         from matio import load_from_mat
     except ImportError:
@@ -175,24 +176,7 @@ def _objects(path: Path, options: Options) -> tuple[Table, ...]:
     with errors_of_library(path, damage), warnings.catch_warnings():
         # SciPy, which mat-io uses, warns about internal data of the objects.
         warnings.simplefilter("ignore")
-        content = load_from_mat(str(path))
-    frames = {name: value for name, value in content.items() if hasattr(value, "columns") and hasattr(value, "dtypes")}
-    tables = _with_sensors(path, {name: _columns_of_frame(name, frame) for name, frame in frames.items()})
-    if not tables:
-        held = ", ".join(f"{name} ({type(value).__name__})" for name, value in content.items())
-        raise ReadError(
-            f"{path}: no table named as an accelerometer's or a gyro's in this MATLAB file; it contains {held[:300]}."
-        )
-    if options.topic is None and len(tables) == 2:
-        found = {name: columns_or_none(table) for name, table in tables.items()}
-        acc = [tables[name] for name, of in found.items() if of and of.accelerometer and not of.gyroscope]
-        gyr = [tables[name] for name, of in found.items() if of and of.gyroscope and not of.accelerometer]
-        if len(acc) == len(gyr) == 1:
-            sha256 = file_sha256(path)
-            return replace(acc[0], sensor="accelerometer", sha256=sha256), replace(
-                gyr[0], sensor="gyroscope", sha256=sha256
-            )
-    return (_picked(path, tables, options, "this MATLAB file"),)
+        return dict(load_from_mat(str(path)))
 
 
 def _columns_of_frame(name: str, frame: Any) -> list[tuple[str, Any]]:
