@@ -116,14 +116,6 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     return replace(chosen, findings=(*findings, *_rivals(table, chosen, triads), *_columns_of_words(table, chosen)))
 
 
-def columns_or_none(table: Table) -> Columns | None:
-    """Roles of the columns of a table; None where no sensor is recognised."""
-    try:
-        return find_columns(table, None, None)
-    except ReadError:
-        return None
-
-
 def _meaning(name: str, values: FloatArray) -> ColumnName:
     """What a name says; a column T without a unit that decreases in too many rows for a clock is a temperature."""
     if name.strip() == "T" and np.count_nonzero(np.diff(values) < 0.0) > _FALLS * len(values):

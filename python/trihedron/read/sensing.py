@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -85,22 +85,28 @@ def judge_accelerometer(
         )
         return Judged(stated, (against,))
 
-    def said(unit: AccelerationUnit, code: FindingCode, case: str = "") -> Judged:
-        return Judged(unit, (Finding.of(code, case, static_norm=norm, unit=unit.value),))
-
+    unit = AccelerationUnit.COUNTS
     is_whole = is_integer(readings) or named == WHOLE
     if is_whole and fitting is not AccelerationUnit.G:
+        found = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm)
         if _is_near(norm, 1000.0):
-            return said(AccelerationUnit.COUNTS, FindingCode.UNIT_ASSUMED, "counts-or-mg")
-        return said(AccelerationUnit.COUNTS, FindingCode.UNIT_DETECTED, "accelerometer-counts")
-    if fitting is AccelerationUnit.CM_S2 or abs(norm / _GRAVITY[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL:
+            found = Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", static_norm=norm)
+    elif fitting is not None:
+        unit = fitting
         # A usual scale error makes mg and cm/s^2 indistinguishable.
-        return said(fitting or AccelerationUnit.CM_S2, FindingCode.UNIT_ASSUMED, "mg-or-gal")
-    if fitting is not None:
-        return said(fitting, FindingCode.UNIT_DETECTED, "accelerometer-static")
-    if norm < 1.0 and not is_whole:
-        return said(AccelerationUnit.M_S2, FindingCode.GRAVITY_MISSING)
-    return said(AccelerationUnit.COUNTS, FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity")
+        is_alike = fitting is AccelerationUnit.CM_S2 or abs(norm / _GRAVITY[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
+        if is_alike:
+            found = Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", static_norm=norm, unit=unit.value)
+        else:
+            found = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", static_norm=norm, unit=unit.value)
+    elif norm < 1.0 and not is_whole:
+        unit = AccelerationUnit.M_S2
+        found = Finding.of(FindingCode.GRAVITY_MISSING, static_norm=norm)
+    else:
+        found = Finding.of(
+            FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity", static_norm=norm
+        )
+    return Judged(unit, (found,))
 
 
 _GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
@@ -147,18 +153,43 @@ def judge_gyroscope(
     nearest = min(turning.candidates, key=lambda one: abs(math.log(turning.factor(one))))
     unit = nearest if stated is None else stated
     factor = turning.factor(unit)
-    seen: dict[str, Any] = {"unit": unit.value, "factor": factor}
-    seen |= {"percent": turning.percent, "correlation": turning.correlation}
-    if turning.fits(unit):
-        found = Finding.of(FindingCode.UNIT_DETECTED, "gyro-by-turning", **seen)
-        return Judged(unit, (found if stated is None else _statement("gyro", unit, given),))
-    seen["right_hz"] = turning.rate_hz / factor
-    if stated is None:
-        return Judged(unit, (Finding.of(FindingCode.UNIT_CONTRADICTED, "gyro-no-unit", **seen),))
+    percent, correlation = turning.percent, turning.correlation
     fitting = next((one for one in turning.candidates if turning.fits(one)), None)
-    seen |= {"has_fitting": fitting is not None, "fitting": fitting.value if fitting else ""}
-    against = Finding.of(FindingCode.UNIT_CONTRADICTED, "gyro-by-turning", is_given=given is not None, **seen)
-    return Judged(unit, (against,))
+    if turning.fits(unit) and stated is not None:
+        found = _statement("gyro", unit, given)
+    elif turning.fits(unit):
+        found = Finding.of(
+            FindingCode.UNIT_DETECTED,
+            "gyro-by-turning",
+            unit=unit.value,
+            factor=factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    elif stated is None:
+        found = Finding.of(
+            FindingCode.UNIT_CONTRADICTED,
+            "gyro-no-unit",
+            unit=unit.value,
+            factor=factor,
+            right_hz=turning.rate_hz / factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    else:
+        found = Finding.of(
+            FindingCode.UNIT_CONTRADICTED,
+            "gyro-by-turning",
+            has_fitting=fitting is not None,
+            fitting="" if fitting is None else fitting.value,
+            is_given=given is not None,
+            unit=unit.value,
+            factor=factor,
+            right_hz=turning.rate_hz / factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    return Judged(unit, (found,))
 
 
 def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:

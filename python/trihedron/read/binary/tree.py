@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.columns import SENSORS, columns_or_none, sensor_of_file_name
+from trihedron.read.columns import SENSORS, Columns, find_columns, sensor_of_file_name
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_bytes, first_line
 from trihedron.read.memory import columns_table, frame_columns
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
@@ -103,11 +103,19 @@ def _with_sensors(path: Path, named: Mapping[str, list[tuple[str, Any]]]) -> dic
     for name, columns in named.items():
         with suppress(ReadError):  # lengths differ, or no numbers
             tables[name] = replace(columns_table(str(path), columns), path=path, is_chosen=True)
-    found = {name: table for name, table in tables.items() if columns_or_none(table) is not None}
+    found = {name: table for name, table in tables.items() if _columns_or_none(table) is not None}
     by_name = {name: table for name, table in found.items() if table.names and "" not in table.names}
     # One matrix: the roles of its columns follow from their number, or from --columns.
     by_place = found or {name: table for name, table in tables.items() if table.names is None}
     return by_name or (by_place if len(by_place) == 1 else {})
+
+
+def _columns_or_none(table: Table) -> Columns | None:
+    """Roles of the columns of a table; None where no sensor is recognised."""
+    try:
+        return find_columns(table, None, None)
+    except ReadError:
+        return None
 
 
 def _log_of(path: Path, groups: Groups, options: Options, what: str, *, has_objects: bool) -> tuple[Table, ...]:
@@ -128,7 +136,7 @@ def _log_of(path: Path, groups: Groups, options: Options, what: str, *, has_obje
         )
     sha256 = file_sha256(path)
     if options.topic is None and len(tables) == 2:
-        found = [(columns_or_none(table), table) for table in tables.values()]
+        found = [(_columns_or_none(table), table) for table in tables.values()]
         by_sensor = {
             "gyroscope" if of and not of.accelerometer else "accelerometer": table for of, table in found if of
         }
