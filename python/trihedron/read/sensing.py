@@ -90,23 +90,25 @@ def judge_accelerometer(
     if is_whole and fitting is not AccelerationUnit.G:
         found = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm)
         if _is_near(norm, 1000.0):
-            found = Finding.of(FindingCode.UNIT_ASSUMED, "counts-or-mg", static_norm=norm)
+            found = _alike(unit, norm, is_whole=True)
     elif fitting is not None:
         unit = fitting
         # A usual scale error makes mg and cm/s^2 indistinguishable.
         is_alike = fitting is AccelerationUnit.CM_S2 or abs(norm / _GRAVITY[AccelerationUnit.CM_S2] - 1.0) < MG_OR_GAL
         if is_alike:
-            found = Finding.of(FindingCode.UNIT_ASSUMED, "mg-or-gal", static_norm=norm, unit=unit.value)
+            found = _alike(unit, norm, is_whole=False)
         else:
             found = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", static_norm=norm, unit=unit.value)
     elif norm < 1.0 and not is_whole:
         unit = AccelerationUnit.M_S2
         found = Finding.of(FindingCode.GRAVITY_MISSING, static_norm=norm)
     else:
-        found = Finding.of(
-            FindingCode.UNIT_ASSUMED, "never-whole" if math.isnan(norm) else "no-gravity", static_norm=norm
-        )
+        found = Finding.of(FindingCode.UNIT_ASSUMED, "no-gravity", is_seen=not math.isnan(norm), static_norm=norm)
     return Judged(unit, (found,))
+
+
+def _alike(unit: AccelerationUnit, norm: float, *, is_whole: bool) -> Finding:
+    return Finding.of(FindingCode.UNIT_ASSUMED, "alike", static_norm=norm, unit=unit.value, is_whole=is_whole)
 
 
 _GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}

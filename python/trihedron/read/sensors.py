@@ -215,8 +215,10 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
     stated = [Finding.of(FindingCode.RATE_STATED, rate_hz=told, is_given=is_given)] if told is not None else []
     if chosen.time is None:
         rate, has_gyro = told or ASSUMED_RATE_HZ, chosen.gyroscope is not None
-        severity = Severity.SERIOUS if has_gyro else Severity.WARNING
-        assumed = Finding.of(FindingCode.RATE_ASSUMED, severity=severity, has_gyro=has_gyro, rate_hz=rate)
+        assumed = Finding.of(
+            FindingCode.RATE_ASSUMED, severity=Severity.SERIOUS if has_gyro else Severity.WARNING, has_gyro=has_gyro,
+            rate_hz=rate,
+        )  # fmt: skip
         findings += stated or [assumed]
         return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
     named, given = chosen.time_unit, options.time_unit

@@ -98,12 +98,8 @@ class BiasDrift(BiasProcess):
         gains = _gains_of_steps(context, self.shows_as)
         out = []
         for k in np.argsort(-gains)[:STEPS_KEPT]:
-            at_s, begin_s = 0.5 * (times[k] + times[k + 1]), context.obs.time_s[0]
-            share = (at_s - begin_s) / _duration_s(context)
-            made = self._along(
-                context, lambda x, share=share: (x > share)[:, None].astype(np.float64), per_axis("step"), STEP,
-                {STEP_TIME: (float(at_s), "s")},
-            )  # fmt: skip
+            at_s = float(0.5 * (times[k] + times[k + 1]))
+            made = self._along(context, _after(context, at_s), per_axis("step"), STEP, {STEP_TIME: (at_s, "s")})
             sigma = float(times[k + 1] - times[k]) * np.sqrt(UNIFORM)
             out.append(replace(made, shape_sigma=sigma, n_places=(h - 1) / STEPS_KEPT))
         return out
@@ -195,6 +191,12 @@ def _gains_of_steps(context: Context, sensor: int) -> FloatArray:
         own = np.linalg.svd(later - basis @ (basis.T @ later), full_matrices=False)
         out[k] = ((rows @ own[0][:, own[1] > SEEN]) ** 2).sum()
     return out
+
+
+def _after(context: Context, at_s: float) -> Callable[[FloatArray], FloatArray]:
+    """A step at a time, as a curve (n, 1) of the elapsed share of the session (n,)."""
+    share = (at_s - float(context.obs.time_s[0])) / _duration_s(context)
+    return lambda x: (x > share)[:, None].astype(np.float64)
 
 
 def _duration_s(context: Context) -> float:
