@@ -30,8 +30,6 @@ from trihedron.records.results import CalibrationResult, VerificationResult
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
     acceleration_to_si,
-    degrees_from_radians,
-    mm_s2_from_m_s2,
     rate_to_si,
 )
 
@@ -85,7 +83,6 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
         warnings=(*_doubts(calibration), *_warnings(recording, segments))[:4],
         rate_hz=recording.rate_hz,
         doubts=_doubts(calibration),
-        noise=_noise(recording, segments, matrix, calibration),
         centre=centre,
         matrix=matrix,
     )
@@ -293,19 +290,3 @@ def _doubts(calibration: Calibration | None) -> tuple[str, ...]:
         return ()
     grave = [f for f in calibration.findings if f.severity is Severity.SERIOUS or f.code is FindingCode.OUTLIER_POSE]
     return tuple(f.seen for f in grave if f.code not in _NOT_THE_FIT)
-
-
-def _noise(recording: Recording, segments: Segments, matrix: FloatArray, calibration: Calibration | None) -> str:
-    parts = []
-    sigma = segments.accelerometer_sigma
-    scale = acceleration_to_si(recording.accelerometer_unit) or (1.0 if _is_determined(calibration) else 0.0)
-    if sigma is not None and scale:
-        size = float(np.mean(np.abs(np.diag(matrix)) * sigma)) * (1.0 if _is_determined(calibration) else scale)
-        parts.append(f"{mm_s2_from_m_s2(size):.2g} mm/s²")
-    if segments.gyroscope_sigma is not None:
-        rate = rate_to_si(recording.gyroscope_unit)
-        if calibration is not None and calibration.gyroscope is not None:
-            rate = float(np.mean(np.abs(np.diag(calibration.gyroscope.S))))
-        if rate:
-            parts.append(f"{degrees_from_radians(rate * float(np.mean(segments.gyroscope_sigma))):.2g} °/s")
-    return ", ".join(parts)

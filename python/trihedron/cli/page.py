@@ -41,7 +41,6 @@ def view_as_json(view: GuideView, lost: int = 0) -> str:
         "warnings": list(view.warnings[:3]),
         "wanted": view.accuracy.sentence(),
         "rate": None if known is None else round(known.rate_hz, 2),
-        "noise": "" if known is None else known.noise,
         "needed": None if known is None else known.poses_needed,
         "shortfall": None if known is None or not math.isfinite(known.shortfall) else round(known.shortfall, 3),
         "good": known is not None and known.is_good_enough,

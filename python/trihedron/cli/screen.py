@@ -46,10 +46,10 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     facts = [how_many(view.n_poses, "pose"), *([] if known is None else [_to_go(known)]), f"{lost} lost"]
     facts += [] if seconds is None else [f"{seconds:.0f} s"]
     if known is not None:
-        facts += [f"{known.rate_hz:.4g} Hz", *([f"noise {known.noise}"] if known.noise else [])]
+        facts.append(f"{known.rate_hz:.4g} Hz")
     while len(" | ".join(facts)) > inner:
         facts.pop()
-    most = max(height - 21, 1)
+    most = max(height - 8 - len(body.plain.splitlines()), 1)
     warned = [Text(line, style=BAD, no_wrap=True) for line in _in_lines(view.warnings, inner - 1, most)]
     foot = Text(" | ".join(facts), style=DIM, no_wrap=True)
     title = f"trihedron guide: {view.accuracy.sentence()}"

@@ -77,7 +77,6 @@ class Examination:
     pose_s: float = 4.0
     warnings: tuple[str, ...] = ()
     rate_hz: float = 0.0
-    noise: str = ""
     # Raw accelerometer reading → vector along up in the body: matrix · (reading − centre).
     centre: FloatArray = field(default_factory=lambda: np.zeros(3))
     matrix: FloatArray = field(default_factory=lambda: np.eye(3))

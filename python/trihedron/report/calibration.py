@@ -125,8 +125,8 @@ def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
         beside = f"rms, {_kind(moved, is_held=is_held)}, {AFTER_MOVES}{_drift(calibration)}; "
         beside += f"noise alone {plain_number(floor)}°"
         is_out = excluded_moves(moved)
-        without = f" ({is_out.sum()} of {how_many(len(is_out), 'move')} excluded)" if is_out.any() else ""
-        line = Headline(f"tilt error after a rotation{without}", plain_number(rms), "°", beside)
+        beside += f"; {is_out.sum()} of {how_many(len(is_out), 'move')} excluded" if is_out.any() else ""
+        line = Headline("tilt error after a rotation", plain_number(rms), "°", beside)
         out.append((line, rms / max(floor, TINY), is_held))
     if moved is not None and moved.static_rate_rms is not None and moved.static_rate_floor is not None:
         rms, floor = moved.static_rate_rms, moved.static_rate_floor
@@ -185,8 +185,11 @@ def _result(
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     facts.append(("frame", FRAMES[calibration.frame]))
     blocks: list[Block] = [Facts(tuple(facts))]
+    errors = [line for line, _, _ in errors_of(calibration)]
     for name, sensor in calibration.sensors:
-        rows = fit_in_words(name, sensor)
+        rows = fit_in_words(sensor)
+        own = (line for line in errors if line.what.startswith("gravity") == (name == "accelerometer"))
+        rows += [(line.what, f"{with_unit(line.value, line.unit)} {line.beside}") for line in own]
         if name == "accelerometer" and segments is not None:
             rows += _before_in_words(calibration, segments)
         blocks += [parameter_table(name, sensor), Facts(tuple(rows))]

@@ -10,9 +10,9 @@ from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPL
 from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import excluded_moves, move_noise_deg
 from trihedron.report.document import Block, Headline, Table
-from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
+from trihedron.report.numbers import each_with_sigma, in_mm_s2, plain_number, shown, with_sigma
 from trihedron.report.segments import state_of
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+from trihedron.units import mm_s2_from_m_s2
 
 METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "gravity after rotations between poses"}
 """Words for methods that records store as ids; other methods are words already."""
@@ -25,45 +25,19 @@ def undetermined(grave: Sequence[Finding]) -> list[Headline]:
     return [Headline(what, f"± {plain_number(size, 2)}", "%", beside) for size in sizes]
 
 
-def fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
-    rows = [*_bias(sensor), ("method", METHODS.get(sensor.method, sensor.method))]
-    quality = sensor.quality
-    if quality is None:
-        return rows
-    if name == "accelerometer":
-        rows.append(("gravity error in static poses", f"{_norm_words(quality)}; {AT_REST}"))
-    elif angles_of(quality):
-        rows.append(("tilt error after a rotation", f"{_angle_words(quality)}; {AFTER_MOVES}"))
-    if quality.static_rate_rms is not None and quality.static_rate_floor is not None:
-        seen, noise = (degrees_from_radians(x) for x in (quality.static_rate_rms, quality.static_rate_floor))
-        said = f"{plain_number(seen)} °/s rms {HELD_OUT}; noise alone {plain_number(noise)} °/s; {AT_REST}"
-        rows.append(("gyro rate in static poses", said))
-    return rows
-
-
-def _bias(sensor: SensorCalibration) -> list[tuple[str, str]]:
-    """The bias along each axis, as compared between recordings; empty where S is singular."""
+def fit_in_words(sensor: SensorCalibration) -> list[tuple[str, str]]:
+    """The bias along each axis, as compared between recordings (none where S is singular), and the method."""
+    method = ("method", METHODS.get(sensor.method, sensor.method))
     try:
         axes = axes_of(sensor)
     except ValueError:
-        return []
+        return [method]
     factor, unit = shown(sensor.si_unit)
     bias = each_with_sigma(axes.bias, axes.sigma_bias, factor)
     said = ", ".join(f"{axis} {one}" for axis, one in zip(XYZ, bias, strict=True)) + f" {unit}"
     if sensor.raw_unit == "counts":
         said += f" ({', '.join(each_with_sigma(axes.at_zero, axes.sigma_at_zero))} counts)"
-    return [("bias", f"{said}; {BIAS}")]
-
-
-def _norm_words(quality: FitQuality) -> str:
-    n = how_many(len(quality.residual), "pose")
-    parts = [f"{in_mm_s2(quality.rms)} rms {IN_SAMPLE} ({n})"]
-    if quality.dof <= 0:
-        parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
-    if quality.held_out_rms is not None:
-        parts.insert(0, f"{in_mm_s2(quality.held_out_rms)} rms {HELD_OUT}")
-    parts.append(f"noise alone {in_mm_s2(quality.floor)}")
-    return "; ".join(parts)
+    return [("bias", f"{said}; {BIAS}"), method]
 
 
 def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
@@ -81,19 +55,6 @@ def angles_of(quality: FitQuality) -> list[tuple[str, float, float]]:
         if len(known):
             out.append((label, rms_of(known), float(known.max())))
     return out
-
-
-def _angle_words(quality: FitQuality) -> str:
-    # The one of the headline first, as for the accelerometer.
-    parts = [
-        f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}"
-        for label, rms, worst in angles_of(quality)[::-1]
-    ]
-    assert quality.angle_deg is not None
-    n_moves, n_counted = len(quality.angle_deg), int(counted_moves(quality).sum())
-    if n_counted < n_moves:
-        parts[-1] += f" ({n_counted} of {n_moves} moves, the others excluded)"
-    return "; ".join([*parts, f"noise alone {plain_number(move_floor(quality))}° rms"])
 
 
 def move_floor(quality: FitQuality) -> float:
