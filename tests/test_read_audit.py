@@ -16,7 +16,7 @@ from trihedron.read import ReadError, read_recording
 from trihedron.read.audit.timing import audit_counter
 from trihedron.records import FindingCode, Severity
 from trihedron.simulate import hand_session
-from trihedron.units import AccelerationUnit, RateUnit
+from trihedron.units import RateUnit
 
 N = 4000
 GAPS = "TIME_GAP TIME_JITTER TIME_DUPLICATE TIME_BACKWARD SAMPLES_LOST"
@@ -328,21 +328,6 @@ def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
         path.write_bytes(("t,ax,ay,az,gx,gy,gz\r\n" + "\r\n".join(glued) + "\r\n").encode())
         recording = read_recording(path)
         assert recording.rows_in_file == recording.rows_read == 60
-
-
-def test_readings_in_si_that_step_like_counts_say_their_step(tmp_path):
-    rng = np.random.default_rng(3)
-    table = readings(2000)
-    counts = np.rint(rng.normal([0, 0, 16384], 20, (2000, 3)))
-    table[:, 1:4] = counts * 9.80665 / 16384
-    recording = read_recording(write(tmp_path / "log.csv", table))
-    steps = [f for f in recording.findings if f.code is FindingCode.RAW_LSB]
-    assert [f.severity for f in steps] == [Severity.NOTE]
-    assert steps[0].numbers["x_step"] == pytest.approx(9.80665 / 16384, rel=1e-3)
-    assert recording.accelerometer_unit is AccelerationUnit.M_S2
-    # Fine readings have no step, and whole numbers need no word about theirs.
-    fine = np.column_stack([np.arange(2000) / 100, rng.normal([0, 0, 9.8, 0, 0, 0], 0.02, (2000, 6))])
-    assert FindingCode.RAW_LSB not in codes(read_recording(write(tmp_path / "fine.csv", fine)))
 
 
 def test_equal_readings_under_equal_stamps_are_samples_where_codes_are_coarse(tmp_path):

@@ -128,9 +128,7 @@ def simulated_beside(
     logged = _simulated_log(against, recording, segments, gravity)
     logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
     simulated = _simulation(logged, gravity, alpha, lambda fraction, text: notify(0.05 + 0.4 * fraction, text))
-    n, m = simulated.segments.n_poses, segments.n_poses
-    differing = () if n == m else (Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m),)
-    return simulated, recording, segments, (*differing, *one_sided)
+    return simulated, recording, segments, one_sided
 
 
 def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, notify: Progress) -> Simulated:
@@ -162,7 +160,7 @@ def _both_sensors(
     if recording.gyroscope is None:
         finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="recording")
         return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
-    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="simulation")
+    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="simulated log")
     return logged, *accelerometer_only(recording, segments), (finding,)
 
 

@@ -17,7 +17,7 @@ from trihedron.channel_facts.quiet import Windows, look
 from trihedron.read.audit.invalid import without_invalid
 from trihedron.read.audit.motionless import audit_motionless_accelerometer, audit_motionless_gyro
 from trihedron.read.audit.orientation import audit_orientation
-from trihedron.read.audit.readings import audit_readings, audit_seam, audit_steps
+from trihedron.read.audit.readings import audit_readings, audit_seam
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
@@ -161,7 +161,6 @@ def _audited(
         findings += audit_readings(name, triad, facts.of(name), windows, sensors.place)
         if name == "accelerometer":
             findings += audit_motionless_accelerometer(windows, facts.of(name).step)
-        findings += audit_steps(name, facts.of(name), windows, acc_unit if name == "accelerometer" else gyr_unit)
     if progress is not None:
         progress(1.0, f"read {len(time_s)} samples")
     temperature, supply = sensors.columns.temperature, sensors.columns.supply

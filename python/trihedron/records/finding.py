@@ -58,7 +58,6 @@ class FindingCode(str, Enum):
     SENSORS_EXCHANGED = "sensors-exchanged"
     AXES_CHANGED = "axes-changed"
     CLOCK_JUMPED = "clock-jumped"
-    RAW_LSB = "raw-lsb"
     UNIT_DETECTED = "unit-detected"
     UNIT_CONTRADICTED = "unit-contradicted"
     RATE_STATED = "rate-stated"
@@ -102,7 +101,6 @@ class FindingCode(str, Enum):
     # diagnose, extended calibration
     EFFECTS_MODELLED = "effects-modelled"
     EFFECT_NOT_APPLIED = "effect-not-applied"
-    PROTOCOL_DIFFERS = "protocol-differs"
     # reference
     REFERENCE_NOT_INDEPENDENT = "reference-not-independent"
     REFERENCE_APART = "reference-apart"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -15,14 +14,6 @@ from trihedron.read.turning import Turning
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.records.words import Words
-from trihedron.units import (
-    STANDARD_GRAVITY_M_S2,
-    AccelerationUnit,
-    RateUnit,
-    acceleration_to_si,
-    degrees_from_radians,
-    rate_to_si,
-)
 
 
 def short(sensor: str) -> str:
@@ -64,46 +55,6 @@ def _clipped(sensor: str, limits: list[Limit], place: Place, *, is_static: bool)
         sample=first,
         numbers=numbers,
     )
-
-
-LOST_IN_NOISE = 0.01
-"""LSB over the noise of one reading, below which the LSB is not reported."""
-
-
-def audit_steps(
-    sensor: str, facts: ChannelFacts, windows: Windows | None, unit: AccelerationUnit | RateUnit
-) -> list[Finding]:
-    """A note on the LSB (3,) of readings whose unit is not counts; none where it is far below the noise."""
-    noise = np.zeros(3) if windows is None else windows.quiet_noise(sensor)
-    if unit.value == "counts" or not np.all(facts.step > LOST_IN_NOISE * noise):
-        return []
-    steps = facts.step.tolist()
-    scale = acceleration_to_si(unit) if isinstance(unit, AccelerationUnit) else rate_to_si(unit)
-    usual = float(np.median(steps))
-    return [
-        Finding.of(
-            FindingCode.RAW_LSB,
-            sensor=short(sensor),
-            unit=unit.value,
-            steps=list(zip(AXES, steps, strict=True)),
-            per_unit=_per_unit(usual * (scale or math.nan), sensor),
-            is_accelerometer=sensor == "accelerometer",
-            is_decimal=_is_decimal(usual),
-            numbers={f"{axis}_step": step for axis, step in zip(AXES, steps, strict=True)},
-        )
-    ]
-
-
-def _is_decimal(step: float) -> bool:
-    exponent = math.log10(step)
-    return abs(exponent - round(exponent)) < 1e-4
-
-
-def _per_unit(step_si: float, sensor: str) -> float:
-    """Number of LSB in one g, or in one degree per second."""
-    if sensor == "accelerometer":
-        return STANDARD_GRAVITY_M_S2 / step_si
-    return 1.0 / degrees_from_radians(step_si)
 
 
 Place = Callable[[int], str]

@@ -39,7 +39,6 @@ ENTRIES = {
         "gravity; least certain: {weakest}. A prior of {anchor:.0f %} about an ideal triad constrains all parameters.",
         "The orientations are too much alike.",
         _FACES_OR_POSES,
-        numbers=("rank", "n_parameters", "worst_prediction_g"),
     ),
     (Code.NOT_OBSERVABLE, "poses-uncertain", SERIOUS): Words(
         "The orientations suffice, but the reading of a pose is uncertain by {measured_g:.2g %} of gravity.",
@@ -51,7 +50,6 @@ ENTRIES = {
         "{measured_g:.2g %}); least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
-        numbers=("rank", "n_parameters"),
     ),
     (Code.OUTLIER_POSE, "", WARNING): Words(
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
@@ -71,7 +69,6 @@ ENTRIES = {
         "The accelerometer's axes as stated form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
         "The documented axes of the board are left-handed, or one was stated wrong: poses alone do not determine "
         "signs, the moves of a gyro do.",
-        numbers=("det_S_sign",),
     ),
     (Code.SCALE_NOT_NOMINAL, "accelerometer", WARNING): Words(
         "The {is_common:?common scale of all axes|scale of {axis:axis}} is {scale_ratio:.4g} although the log is in "
@@ -117,6 +114,5 @@ ENTRIES = {
         "if they do, calibrate|See what differs: `trihedron diagnose LOG --calibration FILE`; or calibrate}}}}} "
         "again near the conditions of use.",
         or_severity=SERIOUS,
-        numbers=("is_far",),
     ),
 }

@@ -61,7 +61,6 @@ _CALIBRATE = {
         "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
         "A static log, a chamber log or a table that does not move.",
         "To test those too, record 18 or more poses of 3 to 5 s in different directions.",
-        numbers=("n_poses",),
     ),
 }
 
@@ -75,7 +74,6 @@ _USE = {
     (Code.STATIC_FORCE, "", NOTE): Words(
         f"{_FORCE} (1 σ {{sigma_m_s2:.2g}} m/s²), which agrees with gravity ({{gravity_m_s2:.5g}} m/s²).",
         action="Errors of every pose and move: `trihedron verify FILE LOG`.",
-        numbers=("share",),
     ),
     (Code.STATIC_FORCE, "off", WARNING): Words(
         f"{_FORCE}, {{share:.2g %}} off gravity ({{gravity_m_s2:.5g}} m/s²); its scatter and the calibration's "
@@ -89,13 +87,11 @@ _USE = {
         "mean is {norm_m_s2:.5g} m/s² and gravity {gravity_m_s2:.5g} m/s².",
         "The calibration is of another sensor or range, or the sensor was not still.",
         "Test it on this log: `trihedron verify FILE LOG`.",
-        numbers=("share",),
     ),
     (Code.STATIC_FORCE, "far", SERIOUS): Words(
         f"{_FORCE}, but gravity {{gravity_m_s2:.5g}} m/s².",
         "The calibration is of another sensor, or the log in another unit or range than it was made for.",
         "Check that calibration and log belong together: `trihedron verify FILE LOG`.",
-        numbers=("share", "sigma_m_s2"),
     ),
     (Code.CALIBRATION_DOUBTED, "", SERIOUS): Words(
         "The calibration itself is not to be trusted: {seen}",
@@ -153,13 +149,11 @@ _DIAGNOSE = {
         "{rms_before:.3g} to {rms_after:.3g} {unit:unit} rms).",
         "The effects belong to this session more than to the sensor, or its poses are too few to determine their size.",
         "`trihedron diagnose` shows them; record another session to see which of them return.",
-        numbers=("n_effects",),
     ),
     (Code.EFFECTS_MODELLED, "undetermined", SERIOUS): Words(
         "The calibration stays linear: beside {effects:ids} nothing determines the gyro's S.",
         "The moves that show it are those that the effects spoil.",
         "Record moves that these effects do not reach; `trihedron diagnose` shows which were excluded.",
-        numbers=("n_effects",),
     ),
     (Code.EFFECTS_MODELLED, "", NOTE): Words(
         "{is_fitted:?S and b were fitted together with {effects:ids}|The diagnosis accepted no effect: the linear "
@@ -168,7 +162,6 @@ _DIAGNOSE = {
         "{is_left:?{is_fitted:?Record again: what returns belongs to the sensor, what does not to the session."
         "|`trihedron diagnose` shows where it occurs.}|{is_fitted:?`trihedron apply` compensates the effects that "
         "belong to the sensor; S and b alone are only part of this model.|}}",
-        numbers=("n_effects", "n_domains_left"),
         or_severity=WARNING,
     ),
     (Code.BIAS_DRIFT, "", WARNING): Words(
@@ -177,12 +170,6 @@ _DIAGNOSE = {
         "{is_warm:?The sensor warms up|Temperature, supply or ageing}.",
         "{is_warm:?Record again with a warm sensor, and let it warm up before use|Measure the bias in a static pose "
         "before use}.",
-        numbers=("change_x", "change_y", "change_z"),
-    ),
-    (Code.PROTOCOL_DIFFERS, "", NOTE): Words(
-        "The simulated recording has {n_simulated} poses and the real one {n_real}.",
-        "They do not follow the same protocol, or a pose was not static.",
-        "Parameters, noise and physics are compared all the same, each from its own poses; their uncertainties differ.",
     ),
 }
 
@@ -233,7 +220,6 @@ _MANY_RECORDINGS = {
         "of temperature.",
         "Biases and scales of every part follow temperature.",
         "Use --by temperature.",
-        numbers=("span_degc",),
     ),
     (Code.SEVERAL_DEVICES, "", WARNING): Words(
         "The {parameter:ids} differs between the recordings: {amount}.",
@@ -250,7 +236,6 @@ _MANY_RECORDINGS = {
             f"The {{parameter:ids}}{{is_of_device:? of {{device}}|}} {seen}.",
             cause,
             _MANY,
-            numbers=("p_adjusted", "where"),
             or_severity=SERIOUS,
         )
         for parameter, cause in _CHANGED_CAUSE.items()

@@ -12,14 +12,12 @@ _TIMESTAMPS = {
         "{is_irregular:?A program that samples in its own time: its timestamps were kept.|Timestamps taken when the "
         "data arrived, or rounded.}",
         "Take timestamps in the sensor's own interrupt if turns matter.",
-        numbers=("median_rate_hz", "mean_rate_hz"),
         or_severity=WARNING,
     ),
     (Code.TIME_DUPLICATE, "", WARNING): Words(
         "{count} samples ({fraction:.3g %}) have the same time as the one before (first: {where}).",
         "Several samples with one timestamp, timestamps of too few digits, or rows written twice.",
         "{is_mended:?|With samples timestamped in batches, read with --columns time=none and --rate.}",
-        numbers=("sample",),
         or_severity=NOTE,
     ),
     (Code.TIME_GAP, "", WARNING): Words(
@@ -27,38 +25,32 @@ _TIMESTAMPS = {
         "Where: {worst:each; }{has_more:?; and others|}.",
         "Lost packets, a full buffer, or a pause of the logger.",
         _INTEGRATED,
-        numbers=("sample",),
         or_severity=SERIOUS,
         lines={"worst": "{v0:.4g} s before {v1}"},
     ),
     (Code.TIME_WRAPPED, "", NOTE): Words(
         "The clock starts again from 0 at {modulus:.12g}, {count} times (first: {where}); the time was continued.",
-        numbers=("sample",),
     ),
     (Code.TIME_BACKWARD, "", WARNING): Words(
         "Time runs backward at {count} places (first: {where}); the rows were sorted by time, none moved further than "
         "{displaced_rows} rows.",
         "Packets that overtook each other.",
         "If the rows stand in the right order and the timestamps are wrong, read with --columns time=none and --rate.",
-        numbers=("sample",),
     ),
     (Code.TIME_BACKWARD, "set", WARNING): Words(
         "The clock was set back at {count:# place} (first: {where}; by up to {largest:.4g} in its own unit); the rows "
         "keep their order, and the time continues there by one interval.",
         "A clock that was synchronised while the log ran.",
         "Take the timestamps from a clock that is never set (monotonic).",
-        numbers=("sample",),
     ),
     (Code.NON_FINITE, "time", WARNING): Words(
         "{count} rows have no time (first: {where}) and were excluded.",
         "Damaged rows.",
         "Check the logger.",
-        numbers=("row",),
     ),
     (Code.TIME_UNIT_DETECTED, "", NOTE): Words(
         "The time column is in {unit:unit}, by its median interval of {step:.6g}{has_others:?; {others:&, } would be "
         "possible too|}.",
-        numbers=("rate_hz",),
     ),
     (Code.TIME_UNIT_DETECTED, "unsure", WARNING): Words(
         "The unit of the time column is uncertain: taken as {unit:unit}, its median interval of {step:.6g} makes "
@@ -66,7 +58,6 @@ _TIMESTAMPS = {
         "The interval alone does not determine the unit; every rate and every noise density depends on it.",
         "Confirm that the time column is in {unit:unit}, which makes {rate_hz:.4g} Hz, or correct it: --time-unit s, "
         "ms, us or ns; --rate HZ if the column counts rows.",
-        numbers=("rate_hz",),
     ),
     (Code.RATE_CONTRADICTED, "time-unit", SERIOUS): Words(
         "Read in {unit:unit} as given, the time column makes {rows:# row} in {span_s:.3g} s, {rate_hz:.6g} Hz"
@@ -91,7 +82,6 @@ _RATES = {
         "not|does not show which part is right}.",
         "A clock that was set or switched in the middle of the log.",
         "Split the log there and calibrate the parts one by one: gyro scale is inversely proportional to the rate.",
-        numbers=("sample",),
     ),
     (Code.RATE_CONTRADICTED, "", WARNING): Words(
         "The rate was given as {given_hz:.6g} Hz but the time column runs at {clock_hz:.6g} Hz; the column was used.",
@@ -120,19 +110,14 @@ _BY_MOTION = (
     "{motion_shows:?the readings in motion contain {followed:.2g %} ± {sigma_followed:.2g %} of that error "
     "(0 %: sampled evenly, 100 %: sampled at the timestamps)|no motion shows when samples were taken}"
 )
-_WITH_THEM = (
-    "period_s", "sigma_period_s", "timestamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s",
-    "is_partly",
-)  # fmt: skip
 _LOG_COUNTER = "Log the sensor's own sample counter or data-ready times if turns matter."
 
 _CLOCKS = {
     (Code.EVEN_CLOCK, "", NOTE): Words(
-        f"The timestamps are {_HOW} about an even clock {_EVEN}, which was used: {_BY_MOTION}.", numbers=_WITH_THEM
+        f"The timestamps are {_HOW} about an even clock {_EVEN}, which was used: {_BY_MOTION}."
     ),
     (Code.TIMESTAMPS_KEPT, "", NOTE): Words(
         f"The timestamps differ from an even clock {_EVEN} by {{timestamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
-        numbers=(*_WITH_THEM, "is_rounded", "is_late"),
     ),
     (Code.CLOCK_UNDECIDED, "", WARNING): Words(
         f"The timestamps are {_HOW} about an even clock {_EVEN} and {_BY_MOTION}: {{is_partly:?both partly right, |}}"
@@ -140,7 +125,6 @@ _CLOCKS = {
         "{is_partly:?Samples taken unevenly and timestamped inexactly.|A sensor that is sampled evenly and timestamped "
         "on arrival, or one that is sampled unevenly.}",
         _LOG_COUNTER,
-        numbers=_WITH_THEM,
     ),
     (Code.CLOCKS_MERGED, "same-timestamps", NOTE): Words("Both sensors have the same timestamps."),
     (Code.CLOCKS_MERGED, "", NOTE): Words(
@@ -151,7 +135,6 @@ _CLOCKS = {
         "{beyond_rows} of the {other}'s, {lost_rows} rows in gaps of the {other} have no reading.",
         "Each sensor was logged with its own timestamps.",
         "{is_resampled:?For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated.|}",
-        numbers=("rate_ratio", "rows_left_out"),
         or_severity=WARNING,
     ),
 }

@@ -16,22 +16,20 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 class Words:
     """Sentences of a finding; ``or_severity`` is another severity that the stage may state instead of the default.
 
-    ``seen``, ``cause`` and ``action`` have placeholders for values (``wording.py``); ``numbers`` names values for JSON
-    only, ``lines`` the sentence part for one group in a placeholder ``{name:each}`` (with placeholders ``v0``, ``v1``
-    ...).
+    ``seen``, ``cause`` and ``action`` have placeholders for values (``wording.py``); ``lines`` is the sentence part for
+    one group in a placeholder ``{name:each}`` (with placeholders ``v0``, ``v1`` ...). Further values are for JSON only.
     """
 
     seen: str
     cause: str = ""
     action: str = ""
-    numbers: tuple[str, ...] = ()
     or_severity: Severity | None = None
     lines: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def places(self) -> frozenset[str]:
-        """Names of all values that a stage must pass."""
-        return places(self.seen) | places(self.cause) | places(self.action) | frozenset(self.numbers)
+        """Names of the values that a stage must pass."""
+        return places(self.seen) | places(self.cause) | places(self.action)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -115,7 +115,6 @@ _MOVES = {
         "error is {residual_deg:.2g}°.",
         "the logger lost samples while the sensor moved.",
         "Repeat the moves with lost samples, at a rate that the link sustains.",
-        numbers=("times",),
     ),
     (Code.GYRO_G_SENSITIVITY, "", NOTE): Words(
         "the gyro's bias follows gravity, as by g-sensitivity, up to {per_g_rad_s:.2g !°/s} ± {sigma_per_g_rad_s:.1g "

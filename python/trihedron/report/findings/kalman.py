@@ -25,21 +25,18 @@ _OF_AXES = {
             "{has_first:?, first in pose {first_pose}|} (99 % limit {nis_high:.2f}).",
             f"The noise is larger than the model says, or {error}.",
             f"{remedy}; until then the uncertainties are multiplied by {{widening:.2g}} for it.",
-            numbers=("axis", "nis_low"),
         ),
         (Code.INNOVATIONS_TOO_SMALL, case, NOTE): Words(
             f"{name}: squared innovations are only {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
             "{nis_low:.2f}).",
             "The noise is smaller than the model says.",
             "The uncertainties are too wide; identify the noise anew if that matters.",
-            numbers=("axis", "nis_high"),
         ),
         (Code.INNOVATIONS_CORRELATED, case, WARNING): Words(
             f"{name}: innovations are correlated from pose to pose (Ljung-Box p = {{whiteness_p:.1e}} over {{n_lags}} "
             "lags, first autocorrelation {autocorrelation_1:+.2f}).",
             f"Bias drift or temperature that the noise model lacks, or {error}.",
             "Look at the innovations against time and attitude; add the missing noise term.",
-            numbers=("axis",),
         ),
     }.items()
 }
@@ -60,7 +57,6 @@ ENTRIES = {
         "The attitudes determine the bias {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
         "Add poses with the axis of this bias up and down.",
-        numbers=("axis",),
     ),
     (Code.NOISE_ASSUMED, "", NOTE): Words(
         "Noise was taken from the scatter inside the poses; bias drift from pose to pose is not known.",

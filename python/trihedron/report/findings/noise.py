@@ -82,7 +82,6 @@ _SPECTRUM = {
         "{n_lines:# periodic line}: {strongest:each}{has_more:? and {n_more} more|}.",
         "mains, a fan, vibration of the building, or a clock inside the sensor.",
         "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
-        numbers=("frequency_hz", "amplitude"),
         lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2:unit})"},
     ),
     (Code.SPECTRUM_LOW_PASS, "throughout", SERIOUS): Words(
@@ -129,7 +128,6 @@ _TERMS = {
         "{walk_upper:.2g} {unit:unit}/√s, not both 0.",
         "the log is short compared with the times over which flicker and walk differ.",
         "Variances of means use the most likely sum of both; record longer to separate them.",
-        numbers=("evidence",),
     ),
     (Code.LOG_DRIFT, "", WARNING): Words(
         "The level drifts by {drift:.3g} {unit:unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit:unit}/s)"

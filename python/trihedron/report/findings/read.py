@@ -22,7 +22,7 @@ _UNITS = {
         _SAY_ACCEL_UNIT,
     ),
     (Code.UNIT_DETECTED, "accelerometer-counts", NOTE): Words(
-        "The accelerometer's readings are whole numbers and were taken as counts.", numbers=("static_norm",)
+        "The accelerometer's readings are whole numbers and were taken as counts."
     ),
     (Code.UNIT_DETECTED, "accelerometer-static", NOTE): Words(
         "The accelerometer reads {static_norm:.4g} while static, so its unit is {unit:unit}."
@@ -173,7 +173,6 @@ _ROWS = {
         "The last line ({line}) breaks off in the middle and was excluded.",
         "The logger was stopped while it wrote.",
         "Nothing is lost but one sample.",
-        numbers=("rows_left_out",),
         or_severity=WARNING,
     ),
     (Code.ROWS_UNACCOUNTED, "", SERIOUS): Words(
@@ -185,7 +184,6 @@ _ROWS = {
     (Code.REPEATED_ROWS, "copies", WARNING): Words(
         "{rows_left_out} rows are copies of the row before, timestamp included (first: {where}); they were excluded.",
         "A logger that writes a row twice, or a stream joined with itself.",
-        numbers=("count", "row"),
     ),
     (Code.SAMPLES_LOST, "bytes-skipped", WARNING): Words(
         "{bytes} bytes at {count} places of the log are damaged and were skipped, readings among them.",
@@ -205,7 +203,6 @@ _ROWS = {
         "{where}){wraps:?; it starts again from 0, and whole rounds leave no trace|}.",
         "Lost packets.",
         _INTEGRATED,
-        numbers=("sample",),
         or_severity=SERIOUS,
     ),
 }
@@ -217,13 +214,11 @@ _DEVICES = {
     ),
     (Code.DEVICE_CHOSEN, "records", NOTE): Words(
         "Each line names its record: {kinds:each}; those of the accelerometer and the gyro were read.",
-        numbers=("rows_left_out",),
         lines={"kinds": "{v0} ({v1})"},
     ),
     (Code.DEVICE_CHOSEN, "in-turn", NOTE): Words(
         "{accelerometer_rows} rows have the accelerometer and {gyroscope_rows} the gyro, with the other's cells empty: "
         "they were read as two logs and joined on their timestamps.",
-        numbers=("rows_left_out",),
     ),
 }
 

@@ -1,6 +1,6 @@
 """Findings about the readings: missing, repeated, frozen, clipped, coarse."""
 
-from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
+from trihedron.report.findings.entry import SERIOUS, WARNING, Code, Words
 
 ENTRIES = {
     (Code.DEVICES_INTERLEAVED, "", SERIOUS): Words(
@@ -15,7 +15,6 @@ ENTRIES = {
         "A reset of the sensor or its driver with other settings, or a sensor mounted anew"
         "{has_others:?. Or it is the {other}: {others:each}|}.",
         "Split the log there, and calibrate the parts one by one.",
-        numbers=("sample",),
         lines=dict.fromkeys(("axes", "others"), "{v0:axis} reads what {v1:?−|}{v2:axis} read"),
     ),
     (Code.AXES_CHANGED, "range", SERIOUS): Words(
@@ -23,20 +22,17 @@ ENTRIES = {
         "it reads {ratio:.3g} times as much.",
         "A reset of the sensor or its driver, with another range or unit.",
         "Split the log there, and calibrate the parts one by one; or multiply the later readings by {inverse:.6g}.",
-        numbers=("sample",),
     ),
     (Code.AXES_CHANGED, "leap", SERIOUS): Words(
         "Gravity leaps from one sample to the next without as much rotation of the gyro (first: {where}; {count} in "
         "all).",
         "Rows were lost there without a gap in time, or the axes of both sensors were turned.",
         "Record again; or split the log there, and calibrate each part that has poses enough.",
-        numbers=("sample",),
     ),
     (Code.NON_FINITE, "readings", WARNING): Words(
         "The {sensor} has {count} rows without a finite reading (first: {where}).",
         "Lost samples, or a logger that writes NaN.",
         "These rows are excluded; nothing is made up in their place.",
-        numbers=("sample",),
         or_severity=SERIOUS,
     ),
     (Code.REPEATED_ROWS, "", WARNING): Words(
@@ -44,7 +40,6 @@ ENTRIES = {
         "the longest run is {longest_run} rows from {where}.",
         "The log is faster than the sensor, or the logger repeats a value when it has no new one.",
         "Noise and uncertainties count repeated rows as new; log at the sensor's own rate.",
-        numbers=("sample",),
         or_severity=SERIOUS,
     ),
     (Code.INVALID_READINGS, "isolated", WARNING): Words(
@@ -52,7 +47,6 @@ ENTRIES = {
         "on all ({counts:each}; first: {where}).",
         "Errors of the bus or of the logger: motion and shocks move all axes.",
         "These rows are excluded; shorten the cable or lower the bus clock before the next log.",
-        numbers=("sample",),
         or_severity=SERIOUS,
         lines={"counts": "{v0} {v1}"},
     ),
@@ -60,7 +54,6 @@ ENTRIES = {
         "{count:# reading} {count:?comes|come} out at the opposite range limit ({counts:each}; first: {where}).",
         "Readings beyond the range of their integers, which overflow.",
         "These rows are excluded; choose a larger range of the sensor, or a wider integer in the logger.",
-        numbers=("sample",),
         or_severity=SERIOUS,
         lines={"counts": "{v0} {v1}"},
     ),
@@ -69,7 +62,6 @@ ENTRIES = {
         "{where}, far longer than chance ({count} in all).",
         "A frozen channel, or a bus that answers with an old value.",
         "{is_excluded:?These rows are excluded; repair|Repair} the channel before the next log.",
-        numbers=("axis", "sample", "axis_name", "value"),
         or_severity=SERIOUS,
     ),
     (Code.STUCK_VALUES, "motionless", SERIOUS): Words(
@@ -78,7 +70,6 @@ ENTRIES = {
         "A dead channel, or a column that is not this axis.",
         "Name its column with --columns, or repair the channel and log again{has_others:?; the accelerometer alone: "
         "--columns {mapping}|}.",
-        numbers=("axis",),
     ),
     (Code.COARSE_RESOLUTION, "", WARNING): Words(
         "The {sensor}'s resolution is coarser than its noise ({axes:each}, raw units).",
@@ -93,13 +84,6 @@ ENTRIES = {
         "{is_static:?If the axis keeps that value in {is_gyro:?motion|other poses} too, it is stuck: check the sensor "
         "and its wiring; else set a wider range|{is_gyro:?Turn with rates below about half the range limit, or set a "
         "wider range; angles integrated over clipped moves are too small|Move more gently, or set a wider range}}.",
-        numbers=("count", "sample"),
         lines={"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# interval})"},
-    ),
-    (Code.RAW_LSB, "", NOTE): Words(
-        "The {sensor}'s readings in {unit:unit} are multiples of a count (LSB {steps:each} {unit:unit}; {per_unit:.5g} "
-        "counts per {is_accelerometer:?g|°/s}).",
-        "{is_decimal:?Rounded to so many decimals when it was written.|Counts times a nominal scale.}",
-        lines={"steps": "{v0:axis} {v1:.5g}"},
     ),
 }

@@ -26,14 +26,12 @@ ENTRIES = {
         "It slipped, or its tracked body was defined anew.",
         "Cut the reference's file there, and give `calibrate` the log twice with `--reference BEFORE --reference "
         "AFTER`: each part has its mounting then.",
-        numbers=("sigma_rad",),
     ),
     (Code.REFERENCE_APART, "slipped-in-noise", WARNING): Words(
         "the reference turned on the body by {angle_rad:.2g deg} at {at_s:.0f} s, which adds to its own error and so "
         "to what is predicted, not to N; the slip makes K less certain.",
         "It slipped, or its tracked body was defined anew.",
         "Cut the reference's file at {at_s:.0f} s, and run `trihedron noise` with either part.",
-        numbers=("sigma_rad",),
     ),
     (Code.REFERENCE_MISFIT, "", WARNING): Words(
         "Parts of the log disagree about the {sensor} by {widened:.2g} times what its residuals' noise explains; the "
@@ -51,7 +49,6 @@ ENTRIES = {
         "Its z points down (north, east, down), or the reference is mirrored, or the log's accelerometer shows gravity "
         "instead of specific force.",
         "If z is up there, turn the sign of one axis of the reference, or of the accelerometer.",
-        numbers=("up_x", "up_y", "up_z"),
     ),
     (Code.REFERENCE_OF_ITSELF, "", WARNING): Words(
         "The reference stands in the log's own file.",
@@ -64,12 +61,10 @@ ENTRIES = {
         "A rate alone says nothing of gravity.",
         "Use the gyro alone: its frame is the reference's body, not the accelerometer's axes. Or calibrate from poses "
         "(`trihedron calibrate LOG`).",
-        numbers=("scale",),
     ),
     (Code.SHARED_MOTION, "", NOTE): Words(
         "Both logs show the same motion (correlation {correlation:.3f}, the other clock {offset_s:+.5g} s): compared "
         "sample by sample they differ by {rate_rms:.3g °/s}{has_force:? and {force_rms:.3g mm/s²}|} rms.",
         "A motion that was replayed, or two units on one body.",
-        numbers=("offset_std_s",),
     ),
 }

@@ -8,7 +8,6 @@ ENTRIES = {
         "{worst_sigmas:.1f} σ (at {worst_s:.1f} s).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
         "Wait until the case has settled, record shorter poses, or put it on a firmer support.",
-        numbers=("worst_pose",),
     ),
     (Code.BIAS_SETTLING, "", WARNING): Words(
         "The accelerometer settles after rotations: {x_percent:.3f}, {y_percent:.3f}, {z_percent:.3f} % (each ± "
@@ -16,7 +15,6 @@ ENTRIES = {
         "The means of the poses, off by {mean_mg:.2f} mg rms, were corrected.",
         "The package or its adhesive yields after a change of load.",
         "S and b are those of the settled sensor: wait about {wait_s:.0f} s after a rotation before a reading counts.",
-        numbers=("p_value",),
     ),
     (Code.POSE_DISTURBED, "", NOTE): Words(
         "{disturbances:# short disturbance} in {poses:# otherwise static pose} (pose {which:first 8}), "
@@ -43,7 +41,6 @@ ENTRIES = {
         "{is_short:?The log is too short, as a table of means of poses is: the readings themselves are needed|The "
         "sensor was moving, or held in the hand{is_slow:?, or its poses were too short for this rate|, all the time}}.",
         "Log again: put the case down for several seconds in each pose{is_slow:?, at 50 Hz or more|}.",
-        numbers=("poses",),
     ),
     (Code.POSES_VIBRATE, "", SERIOUS): Words(
         "The sensor vibrates in its poses: the accelerometer's readings scatter by {scatter_g:.2g} g, more than any "

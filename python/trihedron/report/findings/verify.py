@@ -10,7 +10,6 @@ ENTRIES = {
         "A calibration shift between sessions (temperature, shock, bias repeatability), or a file of another device.",
         "Check that the file is of this sensor (table of parameters in the whole report); several sessions calibrated "
         "together give the repeatability of each.",
-        numbers=("n_others",),
         lines={"parameters": "{v0:ids} {v1:quantity}"},
     ),
     (Code.CALIBRATION_SHIFT, "gyro-bias-alone", WARNING): Words(
@@ -19,7 +18,6 @@ ENTRIES = {
         "Repeatability of the gyro bias (turn-on, temperature), which a calibration of one session does not contain.",
         "Measure the calibrated rate in a static pose before use and subtract it; several sessions calibrated together "
         "give its repeatability.",
-        numbers=("n_others", "n_parameters", "n_judged", "first"),
         lines={"parameters": "{v1:quantity} ({v2:axis})"},
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
@@ -28,7 +26,6 @@ ENTRIES = {
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
         "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
-        numbers=("is_common", "common"),
     ),
     (Code.WORSE_THAN_UNCALIBRATED, "reference", WARNING): Words(
         "The accelerometer is not improved: the gravity error in static poses is {rms_m_s2:.3g mm/s²} rms with this "
