@@ -243,7 +243,7 @@ def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, cap
 def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, capsys):
     log, bare = made_once() / "log.csv", tmp_path / "bare.csv"
     bare.write_text("\n".join(",".join(line.split(",")[:4]) for line in log.read_text().splitlines()) + "\n")
-    for recording, model, lacks in ((log, bare, "the simulated log has none"), (bare, log, "the recording has none")):
+    for recording, model, lacks in ((log, bare, "the simulation has none"), (bare, log, "the recording has none")):
         assert main(["diagnose", str(recording), "--gravity", G, "--against", str(model), "--full"]) == 0
         said = " ".join(capsys.readouterr().out.split())
         assert "the gyro was not compared." in said

@@ -160,7 +160,7 @@ def _both_sensors(
     if recording.gyroscope is None:
         finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="recording")
         return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
-    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="simulated log")
+    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="simulation")
     return logged, *accelerometer_only(recording, segments), (finding,)
 
 
