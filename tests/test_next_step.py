@@ -12,7 +12,7 @@ from trihedron.cli import run as now
 from trihedron.cli.options import GravitySource, LogSource
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report.diagnosis_next_step import next_step_in_words
-from trihedron.report.document import Document, FindingList, Section
+from trihedron.report.document import Document
 
 MY_LOG = "'my log.csv' --rate 50"
 DISAGREES = SimpleNamespace(domain="moves", disagrees=True)
@@ -68,16 +68,6 @@ def test_a_calibration_that_was_not_written_is_stored_first():
     said = filled("Use it: `trihedron apply FILE LOG`.")
     assert said.startswith(f"Store it (`trihedron calibrate {MY_LOG} --latitude 59.9 -o calibration.json`).")
     assert f"`trihedron apply calibration.json {MY_LOG}`" in said
-
-
-def test_what_is_stored_with_effects_is_not_replaced_by_the_calibration_without_them():
-    action = "Calibrate: `trihedron calibrate LOG --extended -o FILE --force`."
-    found = Finding(FindingCode.GYRO_G_SENSITIVITY, Severity.WARNING, "Seen.", "", action)
-    sections = (Section("Findings", (FindingList((found,)),)),)
-    used = "Use it: `trihedron apply FILE LOG`."
-    said = now.with_arguments(Document("A title", "", "Usable.", True, sections, next_step=used)).next_step
-    assert said.count("-o calibration.json") == 1
-    assert "--extended -o calibration.json`" in said
 
 
 def test_the_command_that_a_simulation_of_turns_suggests_gives_a_calibration_without_problems(tmp_path, capsys):

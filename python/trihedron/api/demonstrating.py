@@ -16,6 +16,7 @@ from trihedron.api.verifying import verify
 from trihedron.arrays import FloatArray, rms_of, sigmas_of
 from trihedron.errors import InputError
 from trihedron.files.calibration import plain, write_calibration
+from trihedron.files.log import write_recording
 from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
@@ -165,12 +166,7 @@ def _scenario(layout: int) -> Scenario:
 
 def _session(path: Path, layout: int, overwrite: bool) -> Recording:
     recording, _ = simulate(_scenario(layout), SEED + layout)
-    assert recording.accelerometer is not None
-    assert recording.gyroscope is not None
-    readings = np.hstack([recording.accelerometer, recording.gyroscope]).astype(np.int64)
-    lines = ["time_s,ax,ay,az,gx,gy,gz"]
-    lines += [f"{t:.4f}," + ",".join(map(str, row)) for t, row in zip(recording.time_s, readings.tolist(), strict=True)]
-    write_whole(path, "\n".join(lines) + "\n", overwrite=overwrite)
+    write_recording(recording, path, overwrite=overwrite)
     return read(path)
 
 

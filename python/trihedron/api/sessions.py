@@ -14,7 +14,6 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import amount_of, combine
-from trihedron.arrays import TINY
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among, of_another_unit
@@ -25,8 +24,6 @@ from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Change, Session
 from trihedron.records.words import Words, words
-from trihedron.report.calibration_charts import excluded_moves
-from trihedron.report.calibration_fit import angles_of, move_floor
 from trihedron.sensor_model import in_frame
 from trihedron.session.noise import bias_drift
 
@@ -239,7 +236,6 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
     covariance = jacobian @ calibration.covariance @ jacobian.T
     recording = result.recording
     temperature, low, high, branch = _temperature(result)
-    tilt, moves = _tilt_error(gyro)
     return Session(
         name,
         group,
@@ -252,8 +248,6 @@ def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str)
         branch,
         recording.sha256,
         *_gravity_error(accel),
-        *tilt,
-        *moves,
     )
 
 
@@ -263,16 +257,6 @@ def _gravity_error(sensor: SensorCalibration) -> tuple[float, float]:
     if quality is None or quality.held_out_rms is None or not quality.floor > 0.0:
         return math.nan, math.nan
     return quality.held_out_rms, quality.held_out_rms / quality.floor
-
-
-def _tilt_error(sensor: SensorCalibration | None) -> tuple[tuple[float, float], tuple[int, int]]:
-    """Cross-validated rms after a rotation [deg], and over noise alone; excluded moves, and all."""
-    quality = None if sensor is None else sensor.quality
-    errors, is_out = ([], []) if quality is None else (angles_of(quality), excluded_moves(quality).tolist())
-    if quality is None or len(errors) < 2:
-        return (math.nan, math.nan), (sum(is_out), len(is_out))
-    rms = errors[-1][1]
-    return (rms, rms / max(move_floor(quality), TINY)), (sum(is_out), len(is_out))
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:

@@ -103,7 +103,7 @@ def verify(
         for found in judged.findings
     )
     findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
-    findings = (*doubted(known), *same_recording(known, recording), *_range(known, recording), *changed, *findings)
+    findings = (*same_recording(known, recording), *doubted(known), *_range(known, recording), *changed, *findings)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 
 
@@ -267,7 +267,7 @@ def _judge(
         own = own_calibration(recording, segments, gravity_m_s2)
     judged = verify_calibration(known, recording, segments, gravity_m_s2, source, own)
     findings = (*_range(known, recording), *recording.findings, *segments.findings, *judged.findings, *more)
-    return replace(judged, findings=(*doubted(known), *same_recording(known, recording), *findings))
+    return replace(judged, findings=(*same_recording(known, recording), *doubted(known), *findings))
 
 
 def _on_this_log(known: Calibration, recording: Recording) -> Calibration:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from trihedron.records import Finding, Recording
+    from trihedron.records import Recording
     from trihedron.report.document import Block, Document
 
 _COMMAND = re.compile(r"`(?:trihedron |\.\.\. )[^`]+`")
@@ -145,22 +145,13 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
         what_next = what_next.replace("-o FILE --force", "-o FILE")
         if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
             is_long = stored_by == "..." and len(again(_now().typed)) > LONG
-            option = f"{_extended(document.findings)}-o {UNSTORED}"
+            option = f"-o {UNSTORED}"
             is_added = f": add `{option}` to this `{(*_now().typed, '')[0]}` command"
             how = is_added if is_long else f" (`{stored_by} {option}`)"
             said = f"Store {'S and b' if len(_now().logs) > 1 else 'it'}{how}. {said}"
             what_next = replace(document, next_step=said).what_next
     sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
     return replace(document, next_step=with_commands(what_next), sections=sections)
-
-
-def _extended(findings: Iterable[Finding]) -> str:
-    """The option that fits and stores an effect found in the log that is calibrated; empty where it has none."""
-    from trihedron.records import FindingCode, Severity
-
-    is_found = any(f.code is FindingCode.GYRO_G_SENSITIVITY and f.severity is Severity.WARNING for f in findings)
-    is_one = _now().typed[:1] == ("calibrate",) and len(_now().logs) == 1 and not _now().beside
-    return "--extended " if is_found and is_one else ""
 
 
 def with_commands(text: str) -> str:

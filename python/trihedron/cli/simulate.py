@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from trihedron.cli.options import LogSource, ReadingOptions, with_options
-from trihedron.cli.output import check_outputs, leave, say, write_report
+from trihedron.cli.output import check_outputs, leave, say, show, write_report
 from trihedron.cli.run import name_log, note_file, with_commands
 
 if TYPE_CHECKING:
@@ -147,10 +147,8 @@ def simulate(
     if serve is not None:
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
-    _show(output, recording, known)
-    if beside:
-        say(document.verdict)
-    say(f"→ {with_commands(document.what_next)}")
+    say(f"log: {output}")
+    show(document, None, sections=len(document.sections) - 1)
     leave(findings)
 
 
@@ -161,18 +159,6 @@ def _check_endings(output: Path | None, truth: Path | None) -> None:
         check_suffix(output)
     if truth is not None:
         check_truth_suffix(truth)
-
-
-def _show(output: Path | None, recording: Recording, known: Truth) -> None:
-    """Print a summary of the simulated log."""
-    from trihedron.report.numbers import how_many
-    from trihedron.report.simulation import in_rows
-
-    typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
-    motion = f"{how_many(len(known.poses), 'pose')}, {how_many(len(known.moves), 'move')}"
-    typer.echo(f"{motion}, |g| {known.gravity_m_s2:.6g} m/s²")
-    for name, parameters in known.effects.items():
-        typer.echo(f"effect {name}: " + ", ".join(f"{key} {in_rows(value)}" for key, value in parameters.items()))
 
 
 def _write_template(path: Path, *, force: bool) -> None:

@@ -62,8 +62,7 @@ class Session(Frozen):
     session's own estimate; ``drift`` (n,) the variance of the bias change from session to session (eq. 9.3), else 0.
     ``group`` is the day or the device. Temperatures are those of the poses, NaN where the log has none; ``branch`` is
     +1 for heating, -1 for cooling, 0 for neither. ``gravity_error_m_s2`` is the cross-validated rms in its poses,
-    ``times_noise`` that over noise alone; ``tilt_error_deg`` and ``tilt_times_noise`` the same of the tilt error after
-    a rotation, without ``n_excluded`` of ``n_moves`` moves.
+    ``times_noise`` that over noise alone.
     """
 
     name: str
@@ -78,10 +77,6 @@ class Session(Frozen):
     sha256: str = ""
     gravity_error_m_s2: float = float("nan")
     times_noise: float = float("nan")
-    tilt_error_deg: float = float("nan")
-    tilt_times_noise: float = float("nan")
-    n_excluded: int = 0
-    n_moves: int = 0
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from trihedron.records.domains import DomainResiduals
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.records.results import CalibrationResult
 from trihedron.report.calibration import calibration_report, errors_of
-from trihedron.report.calibration_pictures import orientation_picture
 from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
 from trihedron.report.document import Document, Headline, Picture, Section
@@ -32,13 +31,12 @@ def calibration_result_report(result: CalibrationResult) -> Document:
     beside = errors_beside((result.reference,) if result.reference else ())
     document = calibration_report(result.calibration, result.segments, result.recording, beside)
     document = beside_reference(document, result.reference, 1)
-    return document if result.diagnosis is None else _with_effects(document, result, result.diagnosis)
+    return document if result.diagnosis is None else _with_effects(document, result.diagnosis)
 
 
-def _with_effects(document: Document, result: CalibrationResult, diagnosis: Diagnosis) -> Document:
+def _with_effects(document: Document, diagnosis: Diagnosis) -> Document:
     """The report with the residuals without and with the effects as its lead, and every effect after the result."""
-    pictures = (*effect_pictures(diagnosis), *_sphere(result, diagnosis))
-    effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *pictures))
+    effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *effect_pictures(diagnosis)))
     headlines = _headlines(diagnosis)
     errors = listed([f"{one.what} {with_unit(one.value, one.unit)} ({one.beside})" for one in headlines])
     predicted = f" Errors over all poses and moves, {HELD_OUT} with the effects: {errors}." if errors else ""
@@ -50,17 +48,6 @@ def _with_effects(document: Document, result: CalibrationResult, diagnosis: Diag
         headlines=(*headlines, *document.headlines),
         lead=_changed_picture(diagnosis),
     )
-
-
-def _sphere(result: CalibrationResult, diagnosis: Diagnosis) -> list[Picture]:
-    """Gravity error with the effects by orientation."""
-    means = result.segments.accelerometer_mean
-    for one in diagnosis.residuals:
-        if one.domain == FIRST and means is not None:
-            # A disturbed pose has several rows, each with its name.
-            of = [int(name.split()[1]) - 1 for name in one.names_after]
-            return [orientation_picture(result.accelerometer, means[of], one.after[:, 0])]
-    return []
 
 
 def _headlines(diagnosis: Diagnosis) -> list[Headline]:

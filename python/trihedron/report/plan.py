@@ -3,7 +3,7 @@
 import math
 
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan
-from trihedron.report.document import Document, Facts, Headline, Paragraph, Section, Table
+from trihedron.report.document import Document, Headline, Paragraph, Section, Table
 from trihedron.report.numbers import MINUS, plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
@@ -41,10 +41,7 @@ def plan_report(plan: ExperimentPlan) -> Document:
         headlines=tuple(_headlines(plan, best)),
         next_step=_next_step(plan),
         sections=(
-            Section(
-                "Poses",
-                (_poses(plan.poses), Facts(tuple((pose.name, _worth(pose)) for pose in plan.poses if pose.worth))),
-            ),
+            Section("Poses", (_poses(plan.poses),)),
             Section("Moves between poses", _moves(plan.moves)),
             Section("Known turns", (_turns(plan),)),
         ),
@@ -130,22 +127,6 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
         ("set of poses", "of 9", "scale", "axis angle", "bias"),
         tuple(rows),
         "How many of 9 parameters a set of poses determines, and the largest standard uncertainty (1 σ)",
-    )
-
-
-def _worth(pose: PosePlan) -> str:
-    best = pose.worth[0]
-    if math.isinf(best.loss):
-        n = sum(math.isinf(one.loss) for one in pose.worth)
-        which = "every pose is" if n == pose.n_poses else f"{n} of the {pose.n_poses} poses are"
-        return f"{which} necessary: without it a parameter is not determined"
-    # Rounded to 0.001 %: smaller differences are rounding errors.
-    share, least = (round(100.0 * (loss - 1.0), 3) for loss in (best.loss, pose.worth[-1].loss))
-    if share == least:
-        return f"all poses are equally useful: +{plain_number(share, 2)} % uncertainty without any one"
-    return (
-        f"most useful pose: {best.pose}, +{plain_number(share, 2)} % uncertainty without it; least useful pose: "
-        f"+{plain_number(least, 2)} %"
     )
 
 

@@ -57,7 +57,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
         facts.append(("up", f"{_vector(found.vertical, 1.0)} in the reference's world"))
     if found.earth_rate is not None:
         rate = _vector(found.earth_rate, degrees_from_radians(SECONDS_PER_HOUR))
-        facts.append(("Earth's rate", f"{rate} °/h along the axes of the reference's world{_latitude(found)}"))
+        facts.append(("Earth's rate", f"{rate} °/h along the axes of the reference's world"))
     facts.append(("gyro bias", _bias(found)))
     if found.accelerometer is not None:
         facts.append(("accelerometer", _left(found.accelerometer, mm_s2_from_m_s2(1.0), "mm/s²")))
@@ -102,17 +102,6 @@ def reference_headlines(found: AgainstReference) -> list[Headline]:
         angle = plain_number(degrees_from_radians(last.error_rad))
         out.insert(0, Headline(f"attitude error after {last.horizon_s:g} s", angle, "°", beside))
     return out
-
-
-def _latitude(found: AgainstReference) -> str:
-    """The latitude from the angle between the Earth's rate and the vertical."""
-    if found.vertical is None or found.earth_rate is None:
-        return ""
-    up, rate = found.vertical.value, found.earth_rate.value
-    size = float(np.linalg.norm(rate))
-    sine = float(np.clip(up @ rate / size, -1.0, 1.0))
-    sigma = float(np.sqrt(up @ found.earth_rate.covariance @ up)) / size / max(np.sqrt(1.0 - sine**2), 0.1)
-    return f", latitude {with_sigma(degrees_from_radians(np.arcsin(sine)), degrees_from_radians(sigma))}°"
 
 
 def references_report(calibration: Calibration, references: tuple[AgainstReference, ...]) -> Document:

@@ -93,20 +93,13 @@ def sessions_report(model: SessionsModel) -> Document:
 
 
 def _worst(model: SessionsModel) -> str:
-    """The largest gravity and tilt error of a recording: recordings may agree and be wrong."""
+    """The largest gravity error of a recording: recordings may agree and be wrong."""
     known = [one for one in model.sessions if math.isfinite(one.times_noise)]
     if not known:
         return ""
     worst = max(known, key=lambda one: one.gravity_error_m_s2)
     size = f"{in_mm_s2(worst.gravity_error_m_s2)} ({plain_number(worst.times_noise, 2)} times noise alone)"
-    tilts = [one for one in known if math.isfinite(one.tilt_times_noise)]
-    if tilts:
-        most = max(tilts, key=lambda one: one.tilt_error_deg)
-        size += f", tilt error after a rotation up to {plain_number(most.tilt_error_deg)}°"
-        size += f" ({plain_number(most.tilt_times_noise, 2)} times)"
-    said = f"; gravity error in static poses up to {size}, cross-validated"
-    n_out, n_moves = sum(one.n_excluded for one in tilts), sum(one.n_moves for one in tilts)
-    return f"{said}, {n_out} of {how_many(n_moves, 'move')} excluded" if n_out else said
+    return f"; gravity error in static poses up to {size}, cross-validated"
 
 
 def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
