@@ -139,21 +139,11 @@ def _make_writable() -> None:
 
 
 def _memory_sentence() -> str:
-    from trihedron.read.memory import KEPT_FREE, available_memory_bytes, rows_that_fit
+    from trihedron.read.memory import available_memory_bytes
 
     left = available_memory_bytes()
-    if left is None:
-        return "this log does not fit into memory; cut it into parts, or use a machine with more memory."
-    rows = rows_that_fit(left, 7)
-    if rows < 1000:
-        return (
-            f"there is too little memory to work in ({left / 1e6:.0f} MB left, {KEPT_FREE / 1e6:.0f} MB are needed "
-            "beside a log); raise the limit of memory (`ulimit -v`), or end other programs."
-        )
-    return (
-        f"this does not fit into memory: {left / 1e9:.1f} GB are left, in which a log of about {rows:.2g} rows of 7 "
-        "columns would fit; cut it into parts, or use a machine with more memory."
-    )
+    there_is = "" if left is None else f" ({left / 1e9:.1f} GB are left)"
+    return f"this does not fit into memory{there_is}; cut the log into parts, or use a machine with more memory."
 
 
 def _defect_sentence(error: BaseException) -> str:

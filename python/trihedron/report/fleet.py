@@ -25,7 +25,7 @@ from trihedron.report.fleet_next_step import (
     next_step_of_fleet,
 )
 from trihedron.report.names import axis_in_print, finding_in_print, id_in_print, label_of
-from trihedron.report.numbers import first_of, how_many, listed, plain_number, shown
+from trihedron.report.numbers import capital, first_of, how_many, listed, plain_number, shown
 from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
 
 VERDICTS = {
@@ -50,8 +50,6 @@ def fleet_report(summary: FleetSummary) -> Document:
     if bad:
         reasons = tuple((f"{log.serial}: {log.name}", f"{log.status}: {_reason(log)}") for log in bad)
         sections.append(Section("Logs that were not calibrated", (Facts(reasons),)))
-    if mixed:
-        sections.append(Section("Logs taken for one device that are not", tuple(_mixed(summary))))
     if summary.n_diagnosed:
         sections.append(Section("Physics that devices share", tuple(_physics(summary))))
     if summary.repeated:
@@ -75,9 +73,11 @@ def fleet_report(summary: FleetSummary) -> Document:
     if none and n_done:
         verdict += f" Without a usable calibration: {_named(sorted(none))}."
     for one in summary.mixed:
+        what, away = _by(one.parameter, one.difference)
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices"
         fits = f" and agrees with those of {one.fits}" if one.fits else ""
         verdict += f": {one.odd} differs from the others{fits}." if one.odd else "."
+        verdict += f" {capital(what)} differs by {away}."
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
     if opened:
         found = [f"{VERDICTS[one]} in {how_many(k, 'log')}" for one, k in opened.most_common()]
@@ -177,13 +177,6 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     for verdict, count in Counter(log.verdict for log in summary.logs if log.verdict and is_usable(log)).most_common():
         facts.append((verdict, f"{how_many(count, 'log')}: {VERDICTS.get(verdict, '')}"))
     return tuple(facts)
-
-
-def _mixed(summary: FleetSummary) -> list[Block]:
-    rows = [(one.serial, str(one.n_logs), *_by(one.parameter, one.difference)) for one in summary.mixed]
-    said = "Axes of one unit keep their directions, and its scales repeat within 1 %; these are compared with nothing."
-    head = ("taken for one device", "logs", "parameter", "differs by")
-    return [Paragraph(said), Table(head, tuple(rows), "Logs too unlike")]
 
 
 def _by(parameter: Parameter, difference: float) -> tuple[str, str]:

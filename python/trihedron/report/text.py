@@ -161,7 +161,8 @@ def _table(table: Table, style: Style) -> list[str]:
     """The first layout in which all columns fit, else the one with the fewest parts."""
     rows = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
     keys = _keys(rows[1:])
-    found = [_as_it_is(rows), _with_heads_in_lines(rows), _stacked(rows), _with_names_in_lines(rows, style.width)]
+    plain = [[[cell] for cell in row] for row in rows]
+    found = [(plain, _GAP), ([_heads(rows[0], plain[1:]), *plain[1:]], _GAP), _stacked(rows, style.width)]
     in_lines, gap = min(found, key=lambda one: len(_parts(_widths(one[0]), style.width, one[1], keys)))
     widths = _widths(in_lines)
     out = wrapped(style.plain(table.caption), style.width) if table.caption else []
@@ -181,34 +182,19 @@ def _keys(rows: Sequence[Sequence[str]]) -> int:
     return next((k for k in range(1, most) if len({tuple(row[:k]) for row in rows}) == len(rows)), 1)
 
 
-def _as_it_is(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
-    return [[[cell] for cell in row] for row in rows], _GAP
-
-
-def _with_heads_in_lines(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
-    """Heads wrapped to the width of their columns."""
-    in_lines, gap = _as_it_is(rows)
-    return [_heads(rows[0], in_lines[1:]), *in_lines[1:]], gap
-
-
 def _heads(heads: Sequence[str], below: InLines) -> list[list[str]]:
     widest = _widths(below) if below else [0] * len(heads)
     return [_in_lines(cell, max(most, _FEWEST_OF_HEADS)) for cell, most in zip(heads, widest, strict=True)]
 
 
-def _stacked(rows: Sequence[Sequence[str]]) -> tuple[InLines, int]:
-    """Heads wrapped, uncertainties below their values, and narrower gaps."""
+def _stacked(rows: Sequence[Sequence[str]], columns: int) -> tuple[InLines, int]:
+    """Heads wrapped, uncertainties below their values, row names wrapped to the remaining width, and narrower gaps."""
     low = [[_below(cell) for cell in row] for row in rows[1:]]
-    return [_heads(rows[0], low), *low], _NARROW_GAP
-
-
-def _with_names_in_lines(rows: Sequence[Sequence[str]], columns: int) -> tuple[InLines, int]:
-    """As :func:`_stacked`, with row names wrapped to the remaining width."""
-    in_lines, gap = _stacked(rows)
-    most = columns - sum(width + gap for width in _widths(in_lines)[1:])
+    in_lines = [_heads(rows[0], low), *low]
+    most = columns - sum(width + _NARROW_GAP for width in _widths(in_lines)[1:])
     for row, cells in zip(in_lines, rows, strict=True):
         row[0] = wrapped(cells[0], max(most, _FEWEST))
-    return in_lines, gap
+    return in_lines, _NARROW_GAP
 
 
 def _in_lines(text: str, most: int) -> list[str]:
