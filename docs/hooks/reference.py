@@ -21,7 +21,7 @@ from trihedron.report.findings.page import page as findings
 def commands() -> str:
     """Every command with its arguments and options, as ``--help`` knows them."""
     group: Any = typer.main.get_command(build_app())
-    out = ["# Commands", "", "What `trihedron COMMAND --help` says; `trihedron --man` prints it for `man`.", ""]
+    out = ["# Commands", "", "What `trihedron COMMAND --help` says.", ""]
     out.append(" · ".join(f"[`{name}`](#{name})" for name in group.commands))
     for name, command in group.commands.items():
         out += ["", f"## {name}", "", (command.help or "").split("\f")[0].strip(), ""]
