@@ -33,7 +33,7 @@ pub fn along(
     let mut out = (Vec::new(), Vec::new());
     for ((&m, slope), weight) in clusters.iter().zip(slopes).zip(weight) {
         let place = (slope + 2.0).clamp(0.0, 3.0);
-        let below = (place as usize).min(2);
+        let below = usize::from(place >= 1.0) + usize::from(place >= 2.0);
         let share = place - below as f64;
         let between = |first: f64, second: f64| first.powf(1.0 - share) * second.powf(share);
         let edf = between(

@@ -81,18 +81,17 @@ fn allan_degrees(
 
 /// Degrees of freedom of each variance of a curve, and its expectation over the Allan variance.
 #[pyfunction]
-fn allan_degrees_along<'py>(
-    py: Python<'py>,
+fn allan_degrees_along(
+    py: Python<'_>,
     n: usize,
     clusters: Vec<usize>,
     variance: Vec<f64>,
     weight: Vec<f64>,
     kind: AllanKind,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
-    let (edf, bias) = super::run(py, || {
+) -> PyResult<(Vec<f64>, Vec<f64>)> {
+    super::run(py, || {
         along::along(n, &clusters, &variance, &weight, kind.into())
-    })?;
-    Ok((edf.into_pyarray(py), bias.into_pyarray(py)))
+    })
 }
 
 /// Readings `(n, channels)` in the number type of the log: counts are read without a copy.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units, 
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.errors import InputError
 from trihedron.estimate.noise.from_curve import identify_curve
-from trihedron.estimate.noise.grid import readings_of, reject_size_of_a_unit, temperature_of
+from trihedron.estimate.noise.grid import readings_of, scale_of, temperature_of
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
@@ -24,14 +25,7 @@ from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
 from trihedron.records import Calibration, Finding, Noise, Recording, TermName
 from trihedron.sensor_model import axis_scales
-from trihedron.units import (
-    AccelerationUnit,
-    RateUnit,
-    acceleration_lsb_to_si,
-    acceleration_to_si,
-    rate_lsb_to_si,
-    rate_to_si,
-)
+from trihedron.units import AccelerationUnit, RateUnit
 
 IN_MEMORY_BYTES = 1 << 29
 """Largest log that is read whole into memory: disturbances can then be found and excluded."""
@@ -87,11 +81,7 @@ def allan(
             raise InputError("the size of a count is given twice: by a calibration and by itself; give one.")
         known = calibration_of(calibration)
         recording, doubts = _in_si(recording, known), doubted(known)
-    readings, names, units = readings_of(
-        recording,
-        None if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb),
-        None if accelerometer_lsb is None else acceleration_lsb_to_si(accelerometer_lsb),
-    )
+    readings, names, units = readings_of(recording, gyroscope_lsb, accelerometer_lsb)
     found = identify_noise(
         readings,
         recording.rate_hz,
@@ -126,18 +116,6 @@ def _in_si(recording: Recording, known: Calibration) -> Recording:
     )
 
 
-SENSORS: dict[str, tuple[str, type[AccelerationUnit | RateUnit], Callable[[str], float], str]] = {
-    "g": ("gyro", RateUnit, rate_lsb_to_si, "rad/s"),
-    "a": ("accel", AccelerationUnit, acceleration_lsb_to_si, "m/s^2"),
-}
-"""Name, units, size of a count in SI and SI unit of a sensor, by the first letter of its columns."""
-
-
-def _to_si(unit: AccelerationUnit | RateUnit) -> float | None:
-    """SI per unit of a sensor's readings; ``None`` for counts."""
-    return rate_to_si(unit) if isinstance(unit, RateUnit) else acceleration_to_si(unit)
-
-
 def noise_of_file(
     path: str | os.PathLike[str],
     *,
@@ -161,17 +139,9 @@ def noise_of_file(
     """
     log = open_chunks(Path(path), columns)
     stated = {"g": (gyroscope_unit, gyroscope_lsb), "a": (accelerometer_unit, accelerometer_lsb)}
-    factor, names, units = [], [], []
-    for role in log.roles:
-        name, kind, lsb_to_si, si = SENSORS[role[0]]
-        unit, lsb = kind(stated[role[0]][0] or "counts"), stated[role[0]][1]
-        scale = _to_si(unit)
-        if lsb is not None:
-            scale = lsb_to_si(lsb)
-            reject_size_of_a_unit(name, unit.value, scale)
-        names.append(f"{name} {role[1]}")
-        units.append(unit.value if scale is None else si)
-        factor.append(1.0 if scale is None else scale)
+    sensors = [scale_of(role[0], *stated[role[0]]) for role in log.roles]
+    names = [f"{name} {role[1]}" for role, (name, _, _) in zip(log.roles, sensors, strict=True)]
+    factor, units = [scale for _, scale, _ in sensors], [unit for _, _, unit in sensors]
     scales = np.array(factor)
     is_scaled = bool(np.any(scales != 1.0))
 
@@ -232,17 +202,12 @@ def noise_of_curve(
         )
         raise ReadError(f"{path}: the table does not state the log's {missing}; how certain a point is depends on it.")
     deviation, units = table.deviation.copy(), list(table.units)
-    given = {"g": gyroscope_unit, "a": accelerometer_unit}
+    given: dict[str, Any] = {"g": (gyroscope_unit, RateUnit), "a": (accelerometer_unit, AccelerationUnit)}
     for c, name in enumerate(table.names):
-        first = name[:1].lower()
-        if first not in SENSORS:
-            continue
-        _, kind, _, si = SENSORS[first]
-        if given[first] or units[c] in {unit.value for unit in kind}:
-            scale = _to_si(kind(given[first] or units[c]))
-            if scale is not None:
-                deviation[:, c] *= scale
-                units[c] = si
+        unit, kind = given.get(name[:1].lower(), (None, ()))
+        if unit or units[c] in {one.value for one in kind}:
+            _, scale, units[c] = scale_of(name[:1].lower(), unit or units[c], None)
+            deviation[:, c] *= scale
     return identify_curve(table.tau_s, deviation, rate, length, names=table.names, units=tuple(units), source=str(path))
 
 

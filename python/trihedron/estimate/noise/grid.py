@@ -1,49 +1,56 @@
-"""A recording as equally spaced readings: lost rows become NaN, nothing is shifted or interpolated."""
+"""A recording as equally spaced readings in SI: lost rows become NaN, nothing is shifted or interpolated."""
 
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.errors import InputError
 from trihedron.records import Recording
-from trihedron.units import acceleration_to_si, rate_to_si
+from trihedron.units import AccelerationUnit, RateUnit, acceleration_lsb_to_si, rate_lsb_to_si, si_of
 
 
-def reject_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:
-    """Check that the ``size`` of a count is stated only for readings in counts.
+def scale_of(sensor: str, unit: str | AccelerationUnit | RateUnit | None, lsb: str | None) -> tuple[str, float, str]:
+    """Name of a sensor by the first letter of its columns, the size in SI of readings in ``unit``, 1 for counts of
+    unknown size, and their unit then; ``lsb`` is the size of a count, where known.
 
-    Raises ``InputError`` when a ``size`` is stated and the readings have a physical unit.
+    Raises ``InputError`` when the size of a count is stated for readings in a physical unit, or no unit has this name.
     """
-    if size is not None and unit != "counts":
-        raise InputError(
-            f"the readings of the {sensor} are in {unit}, not in counts: leave --{sensor}-lsb out, or say "
-            f"--{sensor}-unit counts if they are."
-        )
+    if sensor == "g":
+        name, si, known = "gyro", "rad/s", RateUnit(unit or "counts").value
+    else:
+        name, si, known = "accel", "m/s^2", AccelerationUnit(unit or "counts").value
+    scale = None if known == "counts" else si_of(known)
+    if lsb is not None:
+        if known != "counts":
+            raise InputError(
+                f"the readings of the {name} are in {known}, not in counts: leave --{name}-lsb out, or say "
+                f"--{name}-unit counts if they are."
+            )
+        scale = rate_lsb_to_si(lsb) if sensor == "g" else acceleration_lsb_to_si(lsb)
+    return (name, 1.0, known) if scale is None else (name, scale, si)
 
 
 def readings_of(
-    recording: Recording, rad_s_per_count: float | None = None, m_s2_per_count: float | None = None
+    recording: Recording, gyroscope_lsb: str | None = None, accelerometer_lsb: str | None = None
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
-    """Readings (n, channels) in SI (counts stay counts), names and units of the channels; NaN where rows are lost.
+    """Readings (n, channels) in SI (counts of unknown size stay counts), names and units of the channels; NaN where
+    rows are lost.
 
-    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where known. Raises ``InputError`` when most
-    of the time has no reading, or the size of a count is stated for readings in a physical unit.
+    Raises ``InputError`` as :func:`scale_of`, or when most of the time has no reading.
     """
     columns: list[FloatArray] = []
     names: list[str] = []
     units: list[str] = []
-    gyro, accel = recording.gyroscope_unit, recording.accelerometer_unit
     sensors = (
-        ("gyro", recording.gyroscope, gyro.value, rad_s_per_count, rate_to_si(gyro), "rad/s"),
-        ("accel", recording.accelerometer, accel.value, m_s2_per_count, acceleration_to_si(accel), "m/s^2"),
+        ("g", recording.gyroscope, recording.gyroscope_unit, gyroscope_lsb),
+        ("a", recording.accelerometer, recording.accelerometer_unit, accelerometer_lsb),
     )
-    for sensor, readings, unit, stated, known, si_unit in sensors:
+    for letter, readings, unit, lsb in sensors:
         if readings is None:
             continue
-        reject_size_of_a_unit(sensor, unit, stated)
-        factor = stated or known
-        columns.append(readings if factor in (None, 1.0) else readings * factor)
-        names += [f"{sensor} {axis}" for axis in AXES]
-        units += [unit if factor is None else si_unit] * 3
+        name, factor, si = scale_of(letter, unit, lsb)
+        columns.append(readings if factor == 1.0 else readings * factor)
+        names += [f"{name} {axis}" for axis in AXES]
+        units += [si] * 3
     together = np.concatenate(columns, axis=1) if len(columns) > 1 else columns[0]
     return _with_gaps(together, recording), tuple(names), tuple(units)
 

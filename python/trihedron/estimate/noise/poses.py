@@ -7,10 +7,8 @@ logs are then compared figure by figure (:func:`ratio_of`). docs/noise.md, secti
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.low_pass import LEAKAGE, Spectrum, gain_of, low_passes
@@ -21,84 +19,55 @@ from trihedron.records.pose_noise import Measured, OctaveNoise, PoseNoise
 from trihedron.transforms import cosine_transform
 
 SHAPE_TERMS = 2
+EVEN_POWERS = 2.0 * np.arange(1, SHAPE_TERMS + 1)[:, np.newaxis]
 """Even powers of frequency by which the shape below the corner may differ from the best of the list: for running means,
 Butterworth filters to order 4 and their squares the density's error is then 1.3 % at most (2.6 % with one)."""
 SHAPE_ERROR = 0.01
 """Standard uncertainty of the density's logarithm due to that error."""
-SCORING_STEPS = 30
-
-
-@dataclass(frozen=True, eq=False)
-class _Below:
-    """Bins (k,) of one axis below the corner: ``shape`` (k, m) even powers of frequency, ``slow`` (k, j) slow noise."""
-
-    gain: FloatArray
-    shape: FloatArray
-    slow: FloatArray
-    power: FloatArray
-    count: FloatArray
-    rounding: float
-
-
-def _bounded_step(J: FloatArray, r: FloatArray, lowest: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Inverse information of the steps that are free, and the Gauss-Newton step, at least ``lowest``."""
-    found = lsq_linear(J, r, (lowest, np.inf), method="bvls")
-    free = np.flatnonzero(found.active_mask == 0)
-    inverse = np.zeros((J.shape[1], J.shape[1]))
-    inverse[np.ix_(free, free)] = np.linalg.pinv(J[:, free].T @ J[:, free], rcond=1e-12)
-    return inverse, found.x
+FIRST_SLOW = 1e-3
+"""Slow noise relative to the density with which the search begins, at the lowest frequency."""
 
 
 def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: float) -> list[tuple[float, float]]:
     """White density [u²/Hz] of each axis below a common corner, and the standard error of its logarithm.
 
     Whittle likelihood of the ordinates below the corner: density times the gain of ``low_pass`` times exp of an even
-    polynomial of frequency common to the axes, plus each axis' flicker and rounding. The density is the level at
-    frequency zero: the uncertainty of the filter's shape is included. ``low_pass`` has a corner.
+    polynomial of frequency common to the axes, plus each axis' slow noise, relative to its density, and rounding. The
+    level at frequency zero is returned: the uncertainty of the filter's shape is included. ``low_pass`` has a corner.
     """
+    # Imported here: commands that read a log start faster.
+    from scipy.optimize import least_squares
+
     assert low_pass.corner_hz is not None
-    corner = low_pass.corner_hz.value
-    axes = []
-    for spectrum in spectra:
-        frequency, power, count = spectrum.bins
-        below = frequency <= corner
-        f = frequency[below]
-        shape = np.stack([(f / corner) ** (2 * k) for k in range(1, SHAPE_TERMS + 1)], axis=1)
-        gain = gain_of(f, corner, low_pass.shape, rate_hz)
-        axes.append(_Below(gain, shape, spectrum.beneath(f), power[below], count[below], spectrum.rounding))
-    n = len(axes)
-    first = np.cumsum([n, *(a.slow.shape[1] for a in axes)])
-    level = np.array([math.log(max(float(np.median(a.power / a.gain)), TINY)) for a in axes])
-    beneath = [np.zeros(a.slow.shape[1]) for a in axes]
-    bend = np.zeros(SHAPE_TERMS)
-    covariance = np.eye(n)
-    for _ in range(SCORING_STEPS):
-        blocks, rests = [], []
-        for k, axis in enumerate(axes):
-            white = np.exp(level[k] + axis.shape @ bend) * axis.gain
-            # Slow noise relative to the level, bounded below by 0.
-            unit = axis.slow * math.exp(level[k])
-            mean = white + unit @ beneath[k] + axis.rounding
-            design = np.zeros((len(mean), int(first[-1]) + SHAPE_TERMS))
-            design[:, k] = white
-            design[:, first[k] : first[k + 1]] = unit
-            design[:, first[-1] :] = white[:, np.newaxis] * axis.shape
-            root = np.sqrt(axis.count / 2.0) / mean
-            blocks.append(design * root[:, np.newaxis])
-            rests.append((axis.power - mean) * root)
-        J, r = np.vstack(blocks), np.concatenate(rests)
-        lowest = np.concatenate([np.full(n, -np.inf), *(-b for b in beneath), np.full(SHAPE_TERMS, -np.inf)])
-        inverse, step = _bounded_step(J, r, lowest)
-        level = level + np.clip(step[:n], -1.0, 1.0)
-        beneath = [b + step[first[k] : first[k + 1]] for k, b in enumerate(beneath)]
-        bend = bend + step[first[-1] :]
-        covariance = inverse[:n, :n]
-        if float(np.abs(step[:n]).max()) < 1e-6:
-            break
+    corner, n = low_pass.corner_hz.value, len(spectra)
+    bins = [[values[s.bins[0] <= corner] for values in s.bins] for s in spectra]
+    gains = [gain_of(frequency, corner, low_pass.shape, rate_hz) for frequency, _, _ in bins]
+    slow = [s.beneath(frequency) for s, (frequency, _, _) in zip(spectra, bins, strict=True)]
+    sizes = np.cumsum([one.shape[1] for one in slow])
+
+    def residuals(x: FloatArray) -> FloatArray:
+        """Roots of the deviance of every bin, for the log densities, the polynomial and the sizes of slow noise."""
+        bend, out = x[n : n + SHAPE_TERMS], []
+        beneath = np.split(x[n + SHAPE_TERMS :], sizes[:-1])
+        for k, (frequency, power, count) in enumerate(bins):
+            shape = gains[k] * np.exp(bend @ (frequency / corner) ** EVEN_POWERS)
+            ratio = power / (np.exp(x[k]) * (shape + slow[k] @ beneath[k]) + spectra[k].rounding)
+            deviance = np.maximum(ratio - 1.0 - np.log(np.maximum(ratio, TINY)), 0.0)
+            out.append(np.sign(ratio - 1.0) * np.sqrt(count * deviance))
+        return np.concatenate(out)
+
+    level = [math.log(max(float(np.median(b[1] / gain)), TINY)) for b, gain in zip(bins, gains, strict=True)]
+    start = np.array([*level, *[0.0] * SHAPE_TERMS, *[FIRST_SLOW] * sizes[-1]])
+    lowest = np.r_[np.full(n + SHAPE_TERMS, -np.inf), np.zeros(sizes[-1])]
+    found = least_squares(residuals, start, bounds=(lowest, np.inf))
+    free = np.flatnonzero(found.active_mask == 0)
+    J = np.asarray(found.jac, dtype=np.float64)[:, free]
+    covariance = np.zeros((len(start), len(start)))
+    covariance[np.ix_(free, free)] = np.linalg.pinv(J.T @ J, rcond=1e-12)
     # Leakage from below the band: at most the level at its lower end, falling with frequency squared at least.
     leak = np.array([(s.frequency_hz[0] / corner) ** 2 if s.slow == LEAKAGE else 0.0 for s in spectra])
-    sigma = np.sqrt(np.diag(covariance) + SHAPE_ERROR**2 + leak**2)
-    return [(float(np.exp(a)), float(s)) for a, s in zip(level, sigma, strict=True)]
+    sigma = np.sqrt(np.diag(covariance)[:n] + SHAPE_ERROR**2 + leak**2)
+    return [(float(np.exp(a)), float(s)) for a, s in zip(found.x[:n], sigma, strict=True)]
 
 
 FEWEST_POSES = 3
