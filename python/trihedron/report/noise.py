@@ -11,7 +11,7 @@ from trihedron.records.noise import of_axes
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
-from trihedron.report.noise_charts import allan_chart, curve_chart, every_axis_chart, part_names, sensors_chart
+from trihedron.report.noise_charts import allan_chart, curve_chart, part_names, sensors_chart
 from trihedron.report.noise_units import IN_SLOW_NOISE, TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, listed, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.report.segments import rate_in_words
@@ -292,7 +292,7 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
     caption += "; a term with < is in the sum and does not show by itself" if any("<" in name for name in names) else ""
     found = any(axis.optimal_averaging() is not None for axis in axes)
     caption += "; the orange mark is the least deviation." if found else "."
-    return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(allan_chart, noise.curve, unit, axes))
+    return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(allan_chart, noise.curve, [(unit, axes)]))
 
 
 def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
@@ -304,7 +304,7 @@ def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
 
 def noise_picture(noise: Noise) -> Picture:
     """All curves of a log in one figure, a row for each sensor."""
-    return Picture("allan", "Allan deviation of every axis.", partial(every_axis_chart, noise.curve, _groups(noise)))
+    return Picture("allan", "Allan deviation of every axis.", partial(allan_chart, noise.curve, _groups(noise)))
 
 
 def curve_summary(curve: AllanCurve) -> Document:

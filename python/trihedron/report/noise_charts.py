@@ -106,19 +106,23 @@ def _labelled(unit: str) -> str:
     return f"Allan deviation [{unit}]" if unit else "Allan deviation"
 
 
-def allan_chart(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> Chart:
-    """Curves of one sensor, a panel per axis with equal scales."""
+def allan_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
+    """Curves of the sensors, unit and axes of each: a row of panels per sensor, one per axis with equal scales."""
+    rows = [_panels(curve, unit, axes) for unit, axes in groups]
+    return Chart(tuple(panel for row in rows for panel in row), columns=max(len(row) for row in rows))
+
+
+def _panels(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> list[Panel]:
     chosen = [curve.names.index(axis.name) for axis in axes]
     y_limits = room_for(curve, list(zip(axes, chosen, strict=True)), _times(curve))
     last_s = float(curve.tau_s[-1]) * 1.4
     x = replace(TIME, limits=(float(curve.tau_s[0]) / 1.4, last_s))
     printed = unit_in_print(unit)
     y = Scale(_labelled(printed), printed, is_log=True, limits=y_limits)
-    panels = tuple(
+    return [
         Panel(x, y, _marks(curve, c, axis, k, last_s), title=axis_in_print(axis.name), height_px=270)
         for k, (axis, c) in enumerate(zip(axes, chosen, strict=True))
-    )
-    return Chart(panels, columns=3)
+    ]
 
 
 def curve_chart(curve: AllanCurve) -> Chart:
@@ -133,12 +137,6 @@ def curve_chart(curve: AllanCurve) -> Chart:
     unit = units.pop() if len(units) == 1 else ""
     y = Scale(_labelled(unit), unit, is_log=True)
     return Chart((Panel(TIME, y, tuple(marks), height_px=270),))
-
-
-def every_axis_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
-    """Curves of both sensors, a row for each."""
-    rows = [allan_chart(curve, unit, axes).panels for unit, axes in groups]
-    return Chart(tuple(panel for row in rows for panel in row), columns=max(len(row) for row in rows))
 
 
 def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
