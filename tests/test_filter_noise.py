@@ -199,13 +199,13 @@ def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
 def test_an_n_that_is_uncertain_a_limit_the_references_or_below_the_quietest_is_said(found, change, words, is_said):
     # The least of some 60 estimates with a relative error of 5 % each.
     assert found.sensors[0].quietest == pytest.approx(N, rel=0.2)
-    noticed_now = noticed([replace(found.sensors[0], **change)])
+    noticed_now = list(noticed(replace(found.sensors[0], **change)))
     assert any(words in f"{one.code.value} {one.seen}" for one in noticed_now) is is_said
 
 
 def test_a_warning_about_n_stands_in_the_file_as_on_the_screen(found):
     gyro = replace(found.sensors[0], N=Bounded(N / 2.0, 0.45 * N, 0.55 * N), static=None)
-    said = next(one for one in noticed([gyro]) if one.code is FindingCode.FILTER_NOISE_BELOW_QUIETEST)
+    said = next(one for one in noticed(gyro) if one.code is FindingCode.FILTER_NOISE_BELOW_QUIETEST)
     text = filter_noise_text(replace(both(found), findings=(said,)), "kalibr")
     (line,) = [row for row in text.splitlines() if row.startswith("# warning:")]
     assert f"by {gyro.quietest:.3g} in the filter" in line.replace("e-0", "e-")

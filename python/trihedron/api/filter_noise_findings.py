@@ -56,12 +56,8 @@ def unlike_this_log(
             )
 
 
-def noticed(sensors: Sequence[SensorFilterNoise]) -> tuple[Finding, ...]:
-    """Findings about N, K and their consistency, sensor by sensor."""
-    return tuple(finding for one in sensors for finding in _noticed(one))
-
-
-def _noticed(one: SensorFilterNoise) -> Iterator[Finding]:
+def noticed(one: SensorFilterNoise) -> Iterator[Finding]:
+    """Findings about N, K and their consistency of one sensor."""
     sensor, N, has_static = one.sensor, one.N, one.static is not None
     if not one.is_settled:
         yield Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=sensor)

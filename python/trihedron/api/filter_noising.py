@@ -119,7 +119,8 @@ def filter_noise(
         motion = motion_of(reference, reference_columns)
         asked = Request(horizons, band, gravity, known.get("gyroscope"), known.get("accelerometer"))
         sensors, of_motion = beside_reference(recording, motion, asked)
-        source, findings = motion.source, (*findings, *motion.findings, *of_motion, *noticed(sensors))
+        about = (finding for one in sensors for finding in noticed(one))
+        source, findings = motion.source, (*findings, *motion.findings, *of_motion, *about)
     else:
         assert own is not None
         sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))

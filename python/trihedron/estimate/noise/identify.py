@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -35,7 +35,7 @@ from trihedron.estimate.noise.slow_changes import (
     slow_changes,
     without,
 )
-from trihedron.estimate.noise.spectrum import Ordinates, ordinates
+from trihedron.estimate.noise.spectrum import ordinates, ordinates_of_means
 from trihedron.estimate.noise.two_levels import two_levels
 from trihedron.ranges import merged
 from trihedron.records import AllanCurve, Finding, FindingCode
@@ -125,10 +125,6 @@ def identify_noise(
             raise InputError(f"{names[c]} holds no finite reading outside the excluded stretches")
         return one.without_events() if automatic else one
 
-    def identified(c: int) -> NoiseAxis:
-        one = seen[c]
-        return one.identified(ordinates, one.blank(), curve, c, tail_error(one.column), heat)
-
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         seen = list(pool.map(undisturbed, range(channels)))
         cuts = merged([*excluded, *(cut for one in seen for cut in one.cuts)])
@@ -145,7 +141,7 @@ def identify_noise(
             findings.append(said)
         findings += [*_motion(seen, rate_hz), *_heated(seen, heat), *_switching(seen, pool)]
         curve = curve_of([one.column[:, np.newaxis] for one in seen], rate_hz, clusters, names, units)
-        axes = list(pool.map(identified, range(channels)))
+        axes = list(pool.map(lambda c: seen[c].identified(seen[c].blank(), curve, c, heat), range(channels)))
     return Noise(
         axes=tuple(axes),
         curve=curve,
@@ -156,13 +152,10 @@ def identify_noise(
     )
 
 
-Bands = Callable[[FloatArray, float, Sequence[tuple[int, int]], Sequence[SlowChange]], list[Ordinates]]
-"""Spectral bands of readings or means (n,), their rate, the stretches between steps and the slow changes."""
-
-
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Readings of one channel, or means of them, ``column`` (n,), with its events and slow changes.
+    """Readings of one channel, ``column`` (n,), with its events and slow changes; or means of ``block`` readings beside
+    the first of them, ``head`` (k,).
 
     ``cuts`` are intervals to exclude, ``choices`` the slow changes that are stated (subtracted) and those that may be
     there, ``share_of_heat`` that of the slow changes which the temperature explains.
@@ -177,6 +170,8 @@ class Channel:
     findings: Sequence[Finding] = ()
     choices: Sequence[Sequence[SlowChange]] = ((),)
     share_of_heat: float = 0.0
+    head: FloatArray | None = None
+    block: int = 1
 
     @property
     def breaks(self) -> list[float]:
@@ -228,23 +223,22 @@ class Channel:
         return blank_axis(self.name, self.unit, self.rate_hz, n, mean, readout(self.column))
 
     def identified(
-        self,
-        bands_of: Bands,
-        blank: NoiseAxis,
-        curve: AllanCurve,
-        channel: int,
-        tails: float,
-        heat: FloatArray | None = None,
+        self, blank: NoiseAxis, curve: AllanCurve, channel: int, heat: FloatArray | None = None
     ) -> NoiseAxis:
-        """The ``blank`` axis with its terms, whose spectrum ``bands_of`` computes, and the findings of the channel."""
+        """The ``blank`` axis with its terms, beside the temperature (n,), and the findings of the channel."""
         blank = replace(blank, findings=(*self.findings, *blank.findings))
         if blank.sample_sigma == 0.0:
             return blank
         range_degc = remarks.UNLOGGED if heat is None else (float(np.min(heat)), float(np.max(heat)))
         edges = np.array([0, *(at for step in self.steps for at in (step.start, step.stop)), len(self.column)])
         stretches = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a >= SHORTEST_STRETCH]
-        beside = beside_each(self.column, self.choices, self.rate_hz)
-        choices = [bands_of(x, self.rate_hz, stretches, changes) for x, changes in beside]
+        choices = [
+            ordinates(x, self.rate_hz, stretches, changes)
+            if self.head is None
+            else ordinates_of_means((x, blank.rate_hz), self.block, stretches, self.head, changes)
+            for x, changes in beside_each(self.column, self.choices, self.rate_hz)
+        ]
+        tails = tail_error(self.column if self.head is None else self.head)
         axis = identify_axis(choices, blank, curve, channel, tails, range_degc)
         # Drift that the temperature explains is stated with it.
         others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)

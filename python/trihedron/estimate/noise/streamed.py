@@ -20,9 +20,8 @@ from trihedron.estimate.noise.allan import (
 )
 from trihedron.estimate.noise.axis import blank_axis
 from trihedron.estimate.noise.identify import Channel, sudden_changes
-from trihedron.estimate.noise.screening import readout, tail_error
-from trihedron.estimate.noise.slow_changes import SlowChange
-from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, Ordinates, ordinates_of_means
+from trihedron.estimate.noise.screening import readout
+from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM
 from trihedron.records import AllanCurve, Noise, NoiseAxis
 
 Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
@@ -108,14 +107,7 @@ def _axis(stream: _core.AllanStream, c: int, mean: float, head: FloatArray, curv
     rate_hz, n = curve.rate_hz, curve.n_samples
     blank = blank_axis(curve.names[c], curve.units[c], rate_hz, n, mean, readout(head))
     means, size = stream.means(c, -(-n // LONGEST_TRANSFORM))
-    channel = Channel(means, rate_hz / size, blank.name, blank.unit)
+    channel = Channel(means, rate_hz / size, blank.name, blank.unit, head=head, block=size)
     steps, _ = sudden_changes(means, channel.rate_hz)
     findings = list(remarks.events(steps, [], [], channel.rate_hz, blank.unit))
-    channel = replace(channel, steps=steps, findings=findings).without_changes()
-
-    def bands(
-        x: FloatArray, _: float, stretches: Sequence[tuple[int, int]], changes: Sequence[SlowChange]
-    ) -> list[Ordinates]:
-        return ordinates_of_means((x, rate_hz), size, stretches, head, changes)
-
-    return channel.identified(bands, blank, curve, c, tail_error(head))
+    return replace(channel, steps=steps, findings=findings).without_changes().identified(blank, curve, c)
