@@ -338,6 +338,17 @@ def test_a_wave_of_few_periods_and_a_level_that_switches_are_named_and_no_walk_i
         assert "K" not in present(found.axes[0])
 
 
+def test_a_second_process_that_no_term_describes_is_named_once_and_widens_the_intervals():
+    rng = np.random.default_rng(2)
+    slow, fast = (with_process(rng, 360_000, 10.0, tau_s, 5e-2, 0.0) for tau_s in (300.0, 3.0))
+    (axis,) = identify_noise(slow + fast + in_time(rng, 360_000, 10.0, N=1e-2), 10.0).axes
+    # The time of the faster one is named; the walk beside it has no corner at 300 s, for eight octaves by little each.
+    (unexplained,) = [one for one in axis.findings if one.code is FindingCode.SPECTRUM_UNEXPLAINED]
+    assert unexplained.numbers["frequency_hz"] < 1.0 / (2.0 * np.pi * 300.0)
+    assert unexplained.numbers["deviation"] < -0.3
+    assert axis.covariance_scale > 10.0
+
+
 def test_a_wave_of_little_more_than_a_period_is_one_change_of_its_size():
     n, rate_hz = 36_000, 1.0
     x = np.random.default_rng(1).normal(0.0, 0.01, n) + 0.02 * np.sin(2.0 * np.pi * np.arange(n) / 28_800.0 + 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -26,7 +27,10 @@ TOLERANCE_GAUSS_MARKOV = 0.02
 """Relative uncertainty of a half octave in the search for a Gauss-Markov process."""
 
 UNLIKELY = 4.0
-"""Deviation of a half octave, in standard errors, that chance explains once in 400 logs of 20 octaves."""
+"""Deviation of a half octave, or of the sum of a run, in standard errors, that chance explains once in 100 logs of 20
+octaves."""
+RUNS = (1, 2, 4, 8)
+"""Half octaves in a run: a decade at most, over which flicker and a walk part by as much."""
 
 BIN_WIDTH = 1.025
 """Ratio of the edges of a bin: the density of a random walk varies by 5 % inside it, and its mean is used."""
@@ -78,21 +82,29 @@ class BinnedSpectrum:
         return BinnedSpectrum(*(getattr(self, one.name)[..., low] for one in fields(self)))
 
     def tempered(self) -> tuple[BinnedSpectrum, float, tuple[float, float] | None]:
-        """The bins with less weight on half octaves that the terms do not explain, z² as variance factor (Birge ratio).
+        """The bins with less weight on half octaves, or runs of them, that the terms do not explain: z² of their sum as
+        variance factor (Birge ratio). A spectrum that bends where the terms do not leaves them for octaves by little.
 
-        Also the largest factor, and the worst deviation of the power, with its frequency, where it exceeds 10 %.
+        Also the largest factor, and the worst mean deviation of the power, with its frequency, where it exceeds 10 %.
         """
         octaves = np.log2(self.frequency_hz / self.frequency_hz[0])
         group = np.unique(np.floor(2.0 * octaves), return_inverse=True)[1]
         n = np.bincount(group, self.count)
-        mean = np.bincount(group, self.count * self.ratio()) / n
+        ratio, frequency = (np.bincount(group, self.count * of) / n for of in (self.ratio(), self.frequency_hz))
         # Cube root: nearly normal for few degrees of freedom (Wilson-Hilferty).
-        z = (np.maximum(mean, 0.0) ** (1 / 3) - (1 - 2 / (9 * n))) / np.sqrt(2 / (9 * n))
-        factor = np.where(np.abs(z) > UNLIKELY, z**2, 1.0)
-        off = np.where(factor > 1.0, mean - 1.0, 0.0)
-        worst = int(np.argmax(np.abs(off)))
-        far = (float(off[worst]), float(np.mean(self.frequency_hz[group == worst]))) if abs(off[worst]) > 0.1 else None
-        return replace(self, count=self.count / factor[group]), float(factor.max()), far
+        z = (np.maximum(ratio, 0.0) ** (1 / 3) - (1 - 2 / (9 * n))) / np.sqrt(2 / (9 * n))
+        factor, worst = np.ones(len(z)), (0.0, 0.0)
+        for width in (width for width in RUNS if width <= len(z)):
+            mean = np.ones(width) / width
+            far, deviation, at = (np.convolve(of, mean, "valid") for of in (z, ratio - 1.0, frequency))
+            for k in np.flatnonzero(np.abs(far) > UNLIKELY / math.sqrt(width)):
+                factor[k : k + width] = np.maximum(factor[k : k + width], width * far[k] ** 2)
+                worst = max(worst, (float(deviation[k]), float(at[k])), key=lambda one: abs(one[0]))
+        return (
+            replace(self, count=self.count / factor[group]),
+            float(factor.max()),
+            worst if abs(worst[0]) > 0.1 else None,
+        )
 
 
 def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolArray] | None = None) -> BinnedSpectrum:
