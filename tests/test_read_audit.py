@@ -85,6 +85,18 @@ def test_rows_written_twice_are_dropped_and_late_packets_sorted_and_both_said(tm
     assert (backward.numbers["displaced_rows"], backward.numbers["sample"]) == (3, 501)
 
 
+@pytest.mark.parametrize(("length", "lag"), [(16, 16), (32, 32), (32, 64), (200, 200)])
+def test_a_buffer_that_is_sent_twice_is_excluded(tmp_path, length, lag):
+    table = table_of(simulated(hand_session(n_poses=8, pose_s=2.0, move_s=1.0)))
+    assert FindingCode.INVALID_READINGS not in codes(read(tmp_path, table))
+    for at in (500, 1100):
+        table[at : at + length, 1:] = table[at - lag : at - lag + length, 1:]
+    recording = read(tmp_path, table)
+    copied = finding(recording, FindingCode.INVALID_READINGS)
+    assert (copied.numbers["rows_left_out"], copied.numbers["sample"]) == (2 * length, 500)
+    assert "axes-changed" not in {one.value for one in codes(recording)}
+
+
 @pytest.mark.parametrize(("sensor", "times"), [(0, 2), (1, 2), (0, 4)])
 def test_a_sensor_slower_than_its_log_and_a_frozen_channel_are_found_with_their_place(tmp_path, sensor, times):
     table = counts()

@@ -18,7 +18,7 @@ from trihedron.channel_facts.static_axes import adc_steps
 from trihedron.quantiles import median
 from trihedron.ranges import edges_of
 from trihedron.read.audit.readings import short
-from trihedron.read.audit.repeats import Repeats, longest_by_chance
+from trihedron.read.audit.repeats import Repeats, copied_blocks, longest_by_chance
 from trihedron.read.sensors import Sensors
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -35,6 +35,7 @@ def without_invalid(sensors: Sensors, rate_hz: float) -> tuple[Sensors, list[Fin
         return sensors, []
     single: list[BoolArray] = []
     wrapped: list[BoolArray] = []
+    copied: list[BoolArray] = []
     stuck: list[tuple[Finding, BoolArray]] = []
     for sensor, readings in sensors.triads.items():
         step = adc_steps(readings)
@@ -43,13 +44,14 @@ def without_invalid(sensors: Sensors, rate_hz: float) -> tuple[Sensors, list[Fin
         alone = np.zeros(len(over), dtype=np.bool_)
         alone[~over] = isolated_rows(readings[~over] if over.any() else readings, noise, step)
         wrapped.append(over)
+        copied.append(copied_blocks(readings))
         single.append(alone)
         stuck += _stuck(sensor, readings, step, windows, sensors)
     findings = [finding for finding, _ in stuck]
-    for case, rows in (("wrapped", wrapped), ("isolated", single)):
+    for case, rows in (("wrapped", wrapped), ("copied", copied), ("isolated", single)):
         if np.any(rows):
             findings.append(_invalid(case, rows, sensors))
-    bad = np.any([*single, *wrapped, *(rows for _, rows in stuck)], axis=0)
+    bad = np.any([*single, *wrapped, *copied, *(rows for _, rows in stuck)], axis=0)
     if not findings or bad.mean() >= HALF:
         return sensors, findings
     numbers = MappingProxyType({**findings[0].numbers, "rows_left_out": float(bad.sum())})

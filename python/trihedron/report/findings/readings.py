@@ -57,6 +57,15 @@ ENTRIES = {
         or_severity=SERIOUS,
         lines={"counts": "{v0} {v1}"},
     ),
+    (Code.INVALID_READINGS, "copied", WARNING): Words(
+        "{count:# reading} {count:?repeats|repeat} earlier ones in blocks, each a different one and under a new "
+        "timestamp ({counts:each}; first: {where}).",
+        "A buffer that was sent or written twice, in place of other samples or beside them.",
+        "These rows are excluded; repair the transfer (DMA, FIFO) before the next log.",
+        numbers=("sample",),
+        or_severity=SERIOUS,
+        lines={"counts": "{v0} {v1}"},
+    ),
     (Code.STUCK_VALUES, "", WARNING): Words(
         "{sensor} {is_triad:?repeats all axes|{axis_name:axis} stays at {value:.7g}} for {longest_run} samples from "
         "{where}, far longer than chance ({count} in all).",
