@@ -1,8 +1,10 @@
-//! Statistics of every log: extreme values, readings that equal the one before or leap away, missing readings.
+//! Statistics of every log: extreme values, readings that equal the one before, earlier ones, or leap away, missing readings.
 
+mod copies;
 mod leaps;
 mod repeats;
 
+pub use copies::copies;
 pub use leaps::{Leap, leaps};
 pub use repeats::{Repeats, WINDOW, repeats};
 

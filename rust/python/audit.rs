@@ -11,6 +11,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(triad_extremes, module)?)?;
     module.add_function(wrap_pyfunction!(triad_repeats, module)?)?;
     module.add_function(wrap_pyfunction!(triad_leaps, module)?)?;
+    module.add_function(wrap_pyfunction!(triad_copies, module)?)?;
     module.add_function(wrap_pyfunction!(readings_near, module)?)
 }
 
@@ -86,6 +87,19 @@ fn triad_leaps<'py>(
         of(|one| one.away)?,
         of(|one| one.error)?,
     ))
+}
+
+/// First row, and the one behind the last, of every block of `(n, 3)` readings that repeats earlier ones.
+#[pyfunction]
+fn triad_copies(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+    farthest: usize,
+    least: usize,
+) -> PyResult<Vec<(usize, usize)>> {
+    let flat = flat3("readings", &readings)?;
+    let found = super::run(py, || Ok(audit::copies(as_rows(&flat), farthest, least)))?;
+    Ok(found.iter().map(|block| (block.start, block.end)).collect())
 }
 
 /// Number of readings of one axis within `depth` of a value, distance of the nearest other, rows `(k,)` of the value.

@@ -31,6 +31,7 @@ from trihedron.read.sensing import WHOLE, Judged, judge_accelerometer, judge_gyr
 from trihedron.read.sensors import Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Options
+from trihedron.read.temperature import temperature_of
 from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
@@ -163,7 +164,9 @@ def _audited(
             findings += audit_motionless_accelerometer(windows, facts.of(name).step)
     if progress is not None:
         progress(1.0, f"read {len(time_s)} samples")
-    temperature, supply = sensors.columns.temperature, sensors.columns.supply
+    temperature_degc, of_temperature = temperature_of(sensors)
+    findings += of_temperature
+    supply = sensors.columns.supply
     for array in (time_s, *present.values()):
         array.setflags(write=False)
         if isinstance(array.base, np.ndarray):
@@ -175,7 +178,7 @@ def _audited(
         rate_hz=rate,
         accelerometer_unit=acc_unit,
         gyroscope_unit=gyr_unit,
-        temperature_degc=None if temperature is None else sensors.column(temperature),
+        temperature_degc=temperature_degc,
         supply_v=None if supply is None else sensors.column(supply),
         start_epoch_s=sensors.start_s,
         source=source,

@@ -69,6 +69,7 @@ class FindingCode(str, Enum):
     SAMPLES_LOST = "samples-lost"
     LOSSES_POSSIBLE = "losses-possible"
     GRAVITY_MISSING = "gravity-missing"
+    TEMPERATURE_IMPLAUSIBLE = "temperature-implausible"
     # segment
     POSE_SETTLING = "pose-settling"
     BIAS_SETTLING = "bias-settling"

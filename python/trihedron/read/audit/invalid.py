@@ -18,7 +18,7 @@ from trihedron.channel_facts.static_axes import adc_steps
 from trihedron.quantiles import median
 from trihedron.ranges import edges_of
 from trihedron.read.audit.readings import short
-from trihedron.read.audit.repeats import Repeats, copied_blocks, longest_by_chance
+from trihedron.read.audit.repeats import Repeats, copied_rows, longest_by_chance
 from trihedron.read.sensors import Sensors
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -44,7 +44,7 @@ def without_invalid(sensors: Sensors, rate_hz: float) -> tuple[Sensors, list[Fin
         alone = np.zeros(len(over), dtype=np.bool_)
         alone[~over] = isolated_rows(readings[~over] if over.any() else readings, noise, step)
         wrapped.append(over)
-        copied.append(copied_blocks(readings))
+        copied.append(copied_rows(readings))
         single.append(alone)
         stuck += _stuck(sensor, readings, step, windows, sensors)
     findings = [finding for finding, _ in stuck]

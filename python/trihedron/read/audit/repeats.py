@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.quantiles import quantile
 
 CHUNK = 1 << 20
@@ -49,56 +49,20 @@ def longest_by_chance(n: int, probability: float) -> float:
 
 # Blocks of rows that repeat earlier ones exactly: a buffer that was sent twice.
 
-FARTHEST, FEWEST_APART, MOST_COPIES = 1024, 2, 3
-"""Rows between a block and its copy, at most (buffers of sensors and of DMA) and at least; copies in succession, beyond
-which the motion itself is periodic, as in a simulation without noise."""
+FARTHEST = 1024
+"""Most rows between a block and its copy: buffers of sensors and of DMA hold fewer."""
 LN_RARE = math.log(1e4)
 """Logarithm of the prior odds against such a block in a log."""
 
 
-def copied_blocks(readings: FloatArray) -> BoolArray:
+def copied_rows(readings: FloatArray) -> BoolArray:
     """(n,) rows of a triad (n, 3) that repeat different earlier rows one by one.
 
     A row that equals a single one of the last ``FARTHEST`` equals by chance the one at a given distance once in as many
-    rows: the evidence of a run at one distance grows by that with each of them.
+    rows: with each of a run at one distance the evidence of a copy grows by that.
     """
+    least = math.ceil((LN_RARE + math.log(max(len(readings), 1) * FARTHEST)) / math.log(FARTHEST))
     out = np.zeros(len(readings), dtype=np.bool_)
-    least = LN_RARE + math.log(max(len(readings), 2)) + math.log(FARTHEST)
-    for first in range(0, len(readings), CHUNK):
-        start = max(first - FARTHEST, 0)
-        apart, is_single = _earlier(readings[start : first + CHUNK])
-        edges = np.flatnonzero(np.diff(apart, prepend=0, append=0))
-        for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-            lag = int(apart[a])
-            if lag < FEWEST_APART or is_single[a:b].sum() * math.log(FARTHEST) < least:
-                continue
-            a, b = _whole_block(readings, start + a, start + b, lag)
-            if b - a <= MOST_COPIES * lag:
-                out[a:b] = True
+    for first, stop in _core.triad_copies(readings, FARTHEST, least):
+        out[first:stop] = True
     return out
-
-
-def _whole_block(readings: FloatArray, a: int, b: int, lag: int) -> tuple[int, int]:
-    """The block from row a to b with the rows around it that repeat those ``lag`` before, too: others equal them."""
-    longest = MOST_COPIES * lag + 1
-    while a > lag and b - a < longest and (readings[a - 1] == readings[a - 1 - lag]).all():
-        a -= 1
-    while b < len(readings) and b - a < longest and (readings[b] == readings[b - lag]).all():
-        b += 1
-    return a, b
-
-
-def _earlier(readings: FloatArray) -> tuple[IntArray, BoolArray]:
-    """(n,) distance to the last earlier row that is equal, 0 without one near; and whether only one is near."""
-    n = len(readings)
-    # Rows without a number equal no other.
-    words = np.where(np.isfinite(readings), readings + 0.0, np.arange(n)[:, None]).view(np.uint64)
-    keys = (words * np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)).sum(axis=1)
-    order = np.argsort(keys, kind="stable")
-    earlier = np.full(n, -1)
-    is_same = (readings[order[1:]] == readings[order[:-1]]).all(axis=1)
-    earlier[order[1:][is_same]] = order[:-1][is_same]
-    rows = np.arange(n)
-    apart = np.where((earlier >= 0) & (rows - earlier <= FARTHEST), rows - earlier, 0)
-    second = np.where(earlier >= 0, earlier[earlier], -1)
-    return apart, (apart > 0) & ((second < 0) | (rows - second > FARTHEST))

@@ -95,4 +95,12 @@ ENTRIES = {
         "wider range; angles integrated over clipped moves are too small|Move more gently, or set a wider range}}.",
         lines={"limits": "{v0:axis} at {v1:.7g} ({v2} samples in {v3:# interval})"},
     ),
+    (Code.TEMPERATURE_IMPLAUSIBLE, "", WARNING): Words(
+        "Column {column} has {count:# temperature} from {low:.5g} to {high:.5g}, which no sensor has in °C (first: "
+        "{where}).",
+        "{is_column:?Another unit (K, °F, tenths, counts), or another quantity|A thermometer that was not answering}.",
+        "{is_column:?The column is not used: write it in °C, or name its unit (temperature [K], temperature "
+        "[°F])|These readings are left out}.",
+        numbers=("sample",),
+    ),
 }

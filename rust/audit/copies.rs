@@ -1,0 +1,92 @@
+//! Blocks of different readings that repeat earlier ones one by one: a buffer that was sent twice.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::SHARE;
+
+/// Fewest rows between them: a reading that equals the one before is held, not copied.
+const NEAREST: usize = 2;
+/// Copies in succession beyond which the motion itself is periodic, as in a simulation without noise.
+const MOST: usize = 3;
+
+/// Rows of which at least `least` in a run equal, at one distance, the only equal one among the last `farthest` rows,
+/// with the rows beside them that repeat others at that distance, too.
+#[must_use]
+pub fn copies(rows: &[[f64; 3]], farthest: usize, least: usize) -> Vec<Range<usize>> {
+    let starts: Vec<usize> = (0..rows.len()).step_by(SHARE).collect();
+    starts
+        .par_iter()
+        .flat_map_iter(|&start| of_share(rows, start, farthest, least))
+        .collect()
+}
+
+fn of_share(rows: &[[f64; 3]], start: usize, farthest: usize, least: usize) -> Vec<Range<usize>> {
+    let mut out = Vec::new();
+    let mut seen: HashMap<[u64; 3], (usize, usize)> = HashMap::new();
+    let mut run = (0, 0, 0);
+    let stop = (start + SHARE).min(rows.len());
+    for row in start.saturating_sub(farthest)..=stop {
+        let (mut apart, mut is_single) = (0, false);
+        if row < stop && rows[row].iter().all(|x| x.is_finite()) {
+            let far = |other: usize| other + farthest < row + 1;
+            let key = rows[row].map(|x| (x + 0.0).to_bits());
+            if let Some((last, before)) = seen.insert(key, (row + 1, 0)) {
+                seen.insert(key, (row + 1, last));
+                if !far(last) {
+                    apart = row + 1 - last;
+                    is_single = before == 0 || far(before);
+                }
+            }
+        }
+        if row < start {
+            continue;
+        }
+        let (distance, first, singles) = run;
+        if apart == distance && row < stop {
+            run.2 += usize::from(is_single);
+            continue;
+        }
+        if distance >= NEAREST && singles >= least {
+            out.extend(whole(rows, first..row, distance));
+        }
+        run = (apart, row, usize::from(is_single));
+    }
+    out
+}
+
+/// The rows around `block` as well that repeat those `apart` before; none where the motion is periodic.
+fn whole(rows: &[[f64; 3]], block: Range<usize>, apart: usize) -> Option<Range<usize>> {
+    let repeats = |row: usize| row >= apart && rows[row] == rows[row - apart];
+    let most = MOST * apart;
+    let (mut first, mut stop) = (block.start, block.end);
+    while stop - first <= most && first > 0 && repeats(first - 1) {
+        first -= 1;
+    }
+    while stop - first <= most && stop < rows.len() && repeats(stop) {
+        stop += 1;
+    }
+    (stop - first <= most).then_some(first..stop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::copies;
+
+    #[test]
+    fn a_block_sent_twice_is_found_and_neither_held_readings_nor_a_periodic_motion() {
+        let reading = |i: u32| [1.3, 2.7, 3.1].map(|k| (f64::from(i * i) * k).sin());
+        let mut rows: Vec<[f64; 3]> = (0..500).map(reading).collect();
+        assert!(copies(&rows, 100, 4).is_empty());
+        for k in 0..20 {
+            rows[200 + k] = rows[170 + k];
+        }
+        assert_eq!(copies(&rows, 100, 4), [200..220]);
+        let held: Vec<_> = (0..500).map(|i| reading(i / 4)).collect();
+        assert!(copies(&held, 100, 4).is_empty());
+        let periodic: Vec<_> = (0..500).map(|i| reading(i % 50)).collect();
+        assert!(copies(&periodic, 100, 4).is_empty());
+    }
+}
