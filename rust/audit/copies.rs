@@ -30,9 +30,8 @@ fn of_share(rows: &[[f64; 3]], start: usize, farthest: usize, least: usize) -> V
     let stop = (start + SHARE).min(rows.len());
     for row in start.saturating_sub(farthest)..=stop {
         let (mut apart, mut is_single) = (0, false);
-        if row < stop && rows[row].iter().all(|x| x.is_finite()) {
+        if let Some(key) = key(rows, row).filter(|_| row < stop) {
             let far = |other: usize| other + farthest < row + 1;
-            let key = rows[row].map(|x| (x + 0.0).to_bits());
             if let Some((last, before)) = seen.insert(key, (row + 1, 0)) {
                 seen.insert(key, (row + 1, last));
                 if !far(last) {
@@ -57,9 +56,20 @@ fn of_share(rows: &[[f64; 3]], start: usize, farthest: usize, least: usize) -> V
     out
 }
 
+/// The bits of a row; none behind the last, or where a reading is missing.
+fn key(rows: &[[f64; 3]], row: usize) -> Option<[u64; 3]> {
+    let finite = rows
+        .get(row)
+        .filter(|row| row.iter().all(|x| x.is_finite()));
+    finite.map(|row| row.map(|x| (x + 0.0).to_bits()))
+}
+
 /// The rows around `block` as well that repeat those `apart` before; none where the motion is periodic.
 fn whole(rows: &[[f64; 3]], block: Range<usize>, apart: usize) -> Option<Range<usize>> {
-    let repeats = |row: usize| row >= apart && rows[row] == rows[row - apart];
+    let repeats = |row: usize| {
+        let here = key(rows, row);
+        row >= apart && here.is_some() && here == key(rows, row - apart)
+    };
     let most = MOST * apart;
     let (mut first, mut stop) = (block.start, block.end);
     while stop - first <= most && first > 0 && repeats(first - 1) {
@@ -83,7 +93,8 @@ mod tests {
         for k in 0..20 {
             rows[200 + k] = rows[170 + k];
         }
-        assert_eq!(copies(&rows, 100, 4), [200..220]);
+        let found: Vec<usize> = copies(&rows, 100, 4).into_iter().flatten().collect();
+        assert_eq!(found, (200..220).collect::<Vec<_>>());
         let held: Vec<_> = (0..500).map(|i| reading(i / 4)).collect();
         assert!(copies(&held, 100, 4).is_empty());
         let periodic: Vec<_> = (0..500).map(|i| reading(i % 50)).collect();
