@@ -62,7 +62,6 @@ ENTRIES = {
         "timestamp ({counts:each}; first: {where}).",
         "A buffer that was sent or written twice, in place of other samples or beside them.",
         "These rows are excluded; repair the transfer (DMA, FIFO) before the next log.",
-        numbers=("sample",),
         or_severity=SERIOUS,
         lines={"counts": "{v0} {v1}"},
     ),
@@ -101,6 +100,5 @@ ENTRIES = {
         "{is_column:?Another unit (K, °F, tenths, counts), or another quantity|A thermometer that was not answering}.",
         "{is_column:?The column is not used: write it in °C, or name its unit (temperature [K], temperature "
         "[°F])|These readings are left out}.",
-        numbers=("sample",),
     ),
 }
