@@ -66,11 +66,6 @@ def _of_process() -> int | None:
     return None
 
 
-def rows_that_fit(left: int, n_columns: int) -> int:
-    """Rows of a log that fit into ``left`` bytes of memory."""
-    return max(left - KEPT_FREE, 0) // (n_columns * BYTES_PER_CELL_AT_PEAK)
-
-
 def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None) -> None:
     """Reject a log that does not fit into memory.
 
@@ -80,7 +75,7 @@ def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None 
     left = available_memory_bytes() if available is None else available
     needed = n_rows * n_columns * BYTES_PER_CELL_AT_PEAK
     if left is not None and needed > max(left - KEPT_FREE, 0):
-        fits = rows_that_fit(left, n_columns)
+        fits = max(left - KEPT_FREE, 0) // (n_columns * BYTES_PER_CELL_AT_PEAK)
         how = f"about {fits:.2g} rows would fit" if fits >= 1000 else "it does not fit at all"
         raise ReadError(
             f"{path}: about {n_rows:.3g} rows of {n_columns} columns need {needed / 1e9:.1f} GB of memory and there "
