@@ -15,6 +15,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.probability import MEDIAN_CHI2
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode
@@ -165,6 +166,9 @@ class Intervals:
         edges = np.flatnonzero(bounds).reshape(-1, 2)
         self.edges = edges[edges[:, 1] - edges[:, 0] + 1 >= max(FEW, round(STEADY_S / self.step_s))]
         self.norm = norm[self.edges].mean(axis=1)
+        # Offsets (of counts about the middle of a range) change directions as much as norms.
+        apart = np.abs(np.log(self.norm / np.median(self.norm))) if len(self.norm) else np.zeros(1)
+        self.direction = math.hypot(DIRECTION, float(np.median(apart)) / math.sqrt(MEDIAN_CHI2[1]))
 
     def blocks(self, readings: FloatArray) -> FloatArray:
         """Means (n, 3) of blocks."""
@@ -211,7 +215,7 @@ def changed_axes(found: Intervals, gyroscope: FloatArray, scales: list[float]) -
     if len(kept) < 2 or not scales:
         return []
     bias = 0.5 * (bias_before[kept] + bias_after[kept + 1])
-    session = Moves(turned, moves[kept], bias, before[kept], after[kept + 1])
+    session = Moves(turned, moves[kept], bias, before[kept], after[kept + 1], found.direction)
     best, scale = max(((session.path(scale), scale) for scale in scales), key=lambda one: one[0].score)
     # Accelerations of the body make a part's scale too small.
     while (better := session.path(scale * (1.0 + 2.0 * SCALE))).score > best.score:
@@ -236,13 +240,14 @@ def changed_axes(found: Intervals, gyroscope: FloatArray, scales: list[float]) -
 @dataclass(frozen=True, eq=False)
 class Moves:
     """Raw rates times the step of blocks (n, 3); first and last block ``edges`` (m, 2) of each move, with the bias
-    there and the directions of gravity ``before`` and ``after`` it (m, 3)."""
+    there and the directions of gravity ``before`` and ``after`` it (m, 3), with their error ``direction`` [rad]."""
 
     turned: FloatArray
     edges: IntArray
     bias: FloatArray
     before: FloatArray
     after: FloatArray
+    direction: float
 
     def path(self, scale: float) -> _Path:
         """The most likely path through ``STATES`` of a gyro whose scale is ``scale`` [rad/s per unit]."""
@@ -252,7 +257,7 @@ class Moves:
             rotation, angle = self._integrated(sign * ratio * scale)
             # A gyro of axes P turns by P R Pᵀ; a reflection -P by R of the opposite rates.
             predicted = np.einsum("sab,mbc,sdc,md->msa", PROPER, rotation, PROPER, self.after, optimize=True)
-            variance = (DIRECTION**2 + (SCALE * angle) ** 2)[:, None]
+            variance = (self.direction**2 + (SCALE * angle) ** 2)[:, None]
             miss = np.sum((self.before[:, None] - predicted) ** 2, axis=2) / variance
             density[:, k : k + len(PROPER)] = -0.5 * miss - np.log(2.0 * np.pi * variance)
         return _most_likely(density, -math.log(4.0 * math.pi))
