@@ -113,6 +113,9 @@ def build_clock(
 
 MAX_DISPLACEMENT = 64
 """Largest number of rows by which a packet may be late; a larger one means another recording."""
+LN_SET = np.log(1e4)
+"""Logarithm of the prior odds against a clock that is set back; an uneven step is e times less likely than an even one,
+at least. Timestamps of arrival that overtake one another have uneven steps in either order."""
 PART = 1 << 20
 """Rows of a long log that are processed together."""
 
@@ -156,7 +159,8 @@ def never_set_back(
     back = np.flatnonzero(step < 0)
     order = np.argsort(raw, kind="stable")
     is_far = np.abs(order - np.arange(len(order))).max() > MAX_DISPLACEMENT
-    if not len(back) or is_far or _n_uneven(step, usual) >= _n_uneven(np.diff(raw[order]), usual):
+    gain = _n_uneven(np.diff(raw[order]), usual) - _n_uneven(step, usual)
+    if is_far or gain < LN_SET:
         return raw
     lifts = np.zeros(len(raw))
     lifts[back + 1] = usual - step[back]
