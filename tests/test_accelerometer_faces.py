@@ -112,7 +112,13 @@ def test_an_axis_documented_the_wrong_way_round_is_reported_and_a_log_in_g_calle
 
 
 @pytest.mark.parametrize(
-    ("headings", "rounds"), [((0.0,), 1), ((0.0, np.pi / 2.0, 0.0), 1), ((0.0, np.pi, 0.0), 1), ((0.0,), 3)]
+    ("headings", "rounds"),
+    [
+        ((0.0,), 1),
+        ((0.0, np.pi / 2.0, 0.0), 1),
+        pytest.param((0.0, np.pi, 0.0), 1, marks=pytest.mark.slow),
+        ((0.0,), 3),
+    ],
 )
 def test_a_leaning_table_stays_within_the_error_bars_whatever_the_headings(headings, rounds):
     rng = np.random.default_rng(5)

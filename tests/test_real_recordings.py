@@ -285,6 +285,7 @@ def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_dat
         assert abs(mine.value - theirs.value) < 3.0 * np.hypot(mine.sigma, theirs.sigma)
 
 
+@pytest.mark.slow
 def test_sessions_of_one_unit_differ_by_what_they_state(real_data):
     """120 differences of accelerometer scales: half lie within 0.5 to 0.9 of their error, of a normal one 0.67."""
     z = []
