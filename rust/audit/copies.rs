@@ -1,6 +1,7 @@
 //! Blocks of different readings that repeat earlier ones one by one: a buffer that was sent twice.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -23,9 +24,32 @@ pub fn copies(rows: &[[f64; 3]], farthest: usize, least: usize) -> Vec<Range<usi
         .collect()
 }
 
+/// The bits of a row.
+type Key = (u64, u64, u64);
+
+/// A hash of three numbers by multiplication: a log is no adversary, and every row is looked up.
+#[derive(Default)]
+struct Mixed(u64);
+
+impl Hasher for Mixed {
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 29)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.write_u64(u64::from(*byte));
+        }
+    }
+
+    fn write_u64(&mut self, value: u64) {
+        self.0 = (self.0.rotate_left(23) ^ value).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+}
+
 fn of_share(rows: &[[f64; 3]], start: usize, farthest: usize, least: usize) -> Vec<Range<usize>> {
     let mut out = Vec::new();
-    let mut seen: HashMap<[u64; 3], (usize, usize)> = HashMap::new();
+    let mut seen: HashMap<Key, (usize, usize), BuildHasherDefault<Mixed>> = HashMap::default();
     let mut run = (0, 0, 0);
     let stop = (start + SHARE).min(rows.len());
     for row in start.saturating_sub(farthest)..=stop {
@@ -57,11 +81,11 @@ fn of_share(rows: &[[f64; 3]], start: usize, farthest: usize, least: usize) -> V
 }
 
 /// The bits of a row; none behind the last, or where a reading is missing.
-fn key(rows: &[[f64; 3]], row: usize) -> Option<[u64; 3]> {
+fn key(rows: &[[f64; 3]], row: usize) -> Option<Key> {
     let finite = rows
         .get(row)
         .filter(|row| row.iter().all(|x| x.is_finite()));
-    finite.map(|row| row.map(|x| (x + 0.0).to_bits()))
+    finite.map(|row| row.map(|x| (x + 0.0).to_bits()).into())
 }
 
 /// The rows around `block` as well that repeat those `apart` before; none where the motion is periodic.

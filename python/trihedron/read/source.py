@@ -2,6 +2,8 @@
 
 import hashlib
 import re
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from trihedron.read.archive import read_npy
@@ -92,5 +94,8 @@ def read_tables(path: Path, options: Options) -> tuple[Table, ...]:
     check_unpacked(path, size, size)
     with errors_of_system(path), path.open("rb") as stream:
         data = stream.read()
-    tables = read_text(path, unpacked(path, data), hashlib.sha256(data).hexdigest(), options.progress)
+    with ThreadPoolExecutor(1) as beside:
+        digest = beside.submit(lambda: hashlib.sha256(data).hexdigest())
+        found = read_text(path, unpacked(path, data), "", options.progress)
+    tables = tuple(replace(one, sha256=digest.result()) for one in found)
     return by_sensor(tables[0]) if len(tables) == 1 else tables

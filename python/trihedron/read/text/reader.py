@@ -53,9 +53,11 @@ class TextReader:
         for block in blocks(self.path, data, start):
             done += len(block)
             # Nearly all blocks contain only rows of numbers and need no further checks.
-            if not self._plain(block, layout, line):
+            n_lines = self._plain(block, layout, line)
+            if not n_lines:
                 self._block(block, layout, line, is_last=done == len(data))
-            line += block.count(b"\n")
+                n_lines = block.count(b"\n")
+            line += n_lines
             if self.progress is not None:
                 self.progress(done / len(data), f"reading {self.path.name}: {self.n_rows} rows")
         return self._table(layout)
@@ -94,11 +96,11 @@ class TextReader:
         )
         return layout
 
-    def _plain(self, block: bytes, layout: Layout, line: int) -> bool:
-        """Read a block that contains only rows of numbers, as in most logs; whether that succeeded."""
+    def _plain(self, block: bytes, layout: Layout, line: int) -> int:
+        """Read a block that contains only rows of numbers, as in most logs; their number, 0 where it has others."""
         # One irregular block may be the incomplete last one; after two, further blocks are not tested.
         if self.n_odd_blocks > 1 or self.texts or layout.decimal_comma or self.true_lines is not None:
-            return False
+            return 0
         room = [column[self.n_rows :] for column in self.columns]
         places = [(i, 0) for i in range(len(room))]
         codes = np.frombuffer(block, dtype=np.uint8)
@@ -106,7 +108,7 @@ class TextReader:
         if is_read:
             self.n_rows += rows
             self.lines.append(range(line, line + rows))
-        return is_read
+        return rows if is_read else 0
 
     def _block(self, block: bytes, layout: Layout, first_line: int, *, is_last: bool) -> None:
         self.n_odd_blocks += 1
