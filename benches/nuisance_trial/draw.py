@@ -30,9 +30,11 @@ STRESSES = {
     "flicker": {"accel-bias-repeatability", "gyro-bias-repeatability"},
     "soft": {"disturbed-pose"},
     "temperature": set(),
+    "step": set(),
 }
 """What strains a healthy instrument, with the effects that may be named: a strong bias random walk, 1/f noise of
-consumer parts (0.3 mg, 20 °/h), soft supports under every pose, a logged temperature that no sensor follows."""
+consumer parts (0.3 mg, 20 °/h), soft supports under every pose, a logged temperature that no sensor follows; and the
+drift of a bias as one step."""
 
 
 def _signed(rng, low, high, size=3):
@@ -129,6 +131,8 @@ def draw(flaw, seed, size=1.0, nuisances=True, stress=None):
         u = t / duration
         curve = (np.exp(-u / rng.uniform(0.05, 0.4)), np.sin(2 * np.pi * u * rng.uniform(0.6, 1.4) + rng.uniform(0, 6)),
                  1 / (1 + np.exp((rng.uniform(0.3, 0.7) - u) / 0.08)))[rng.integers(3)]  # fmt: skip
+        if stress == "step":
+            curve = (u > rng.uniform(0.25, 0.75)).astype(float)
         if flaw[0] == "a":
             force = force + curve[:, None] * _signed(rng, 0.05, 0.2) * size
         else:
