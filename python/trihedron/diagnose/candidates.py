@@ -73,7 +73,7 @@ def candidates_beside(
     asked = model.with_added(leading)
     # Columns that depend on the size (a delay) are computed again for the fitted size.
     sized = {
-        k: replace(term, variant=made)
+        k: term.of_size(model.context, made)
         for k, (term, one) in enumerate(zip(leading, asked, strict=True))
         if (made := term.effect.rescaled(model.context, term.variant, one.value)) is not None
     }
@@ -213,7 +213,7 @@ def as_fits_best(model: Hypothesis, tried: Tried) -> Term:
         made = term.effect.rescaled(model.context, term.variant, asked.value)
         if made is None:
             break
-        term = replace(term, variant=made)
+        term = term.of_size(model.context, made)
         asked = model.with_added([term])[0]
     return _reshaped(model, term)
 

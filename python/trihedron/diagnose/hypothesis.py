@@ -45,6 +45,10 @@ class Term:
         """The effect with a prior so many times as wide."""
         return replace(self, sizes=self.sizes * by, scale=self.scale * by)
 
+    def of_size(self, context: Context, variant: Variant) -> Term:
+        """The effect with columns computed for another size; its prior is the same in physical units."""
+        return replace(self, variant=variant, sizes=self.scale * self.effect.sizes(context, variant))
+
     @property
     def distortion(self) -> Distortion:
         """What it adds to the readings, per unit of each parameter."""
