@@ -8,9 +8,9 @@ from scipy.signal import lfilter
 
 import trihedron
 import trihedron.estimate.session.solved as solved_session
-from confidence.motion import G
-from confidence.sensor import lower, recorded
-from confidence.sessions import hand, manual, table
+from confidence.motion import G, Step, attitude, move
+from confidence.sensor import lower, read_out, recorded
+from confidence.sessions import directions, hand, leaning, table
 from trihedron import calibrate, diagnose
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT
 from trihedron.records import FindingCode
@@ -51,6 +51,22 @@ def test_stated_turns_on_faces_win_over_a_wrong_nominal_scale_and_unstated_ones_
         assert not result.is_trustworthy
     else:
         assert np.abs(result.gyroscope.S - truth.S_w).max() < 1e-3 * truth.S_w[0, 0]
+
+
+def manual(seed):
+    """The session of the manual's section 4: 18 poses by hand, then ±8π on three faces that are not parallel."""
+    rng = np.random.default_rng([13, seed])
+    tilt, lean = leaning(0.5)
+    targets = [attitude(d, rng.uniform(0, 2 * np.pi)) for d in directions(18, rng)]
+    steps = [Step(4.0)]
+    for target in targets[1:]:
+        steps += [Step(2.0, to=target), Step(4.0)]
+    for up in ((0.05, 0.02, 1.0), (1.0, -0.03, 0.04), (0.02, 1.0, 0.06)):
+        steps += [Step(2.5, to=lean @ attitude(up, rng.uniform(0, 2 * np.pi))), Step(4.0)]
+        for angle in (1440.0, -1440.0):
+            steps += [Step(abs(angle) / 120.0 / 0.92, turn=angle), Step(4.0)]
+    motion, per = move(steps, targets[0], rng, 50.0, tilt=tilt, tremor=np.radians(2.0))
+    return (*read_out(motion, per, rng, gyro_range=np.radians(300.0)), motion)
 
 
 def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars():

@@ -64,19 +64,3 @@ def table(seed, turns=(90, -90), rate_deg_s=90.0, tilt_deg=1.0, pose_s=4.0, rate
             steps += [Step(abs(angle) / rate_deg_s / 0.92, turn=angle), Step(pose_s * rng.uniform(0.85, 1.3))]
     motion, per = move(steps, first, rng, rate_hz, tilt=tilt, tremor=np.radians(2.0))
     return (*read_out(motion, per, rng, **sensor), motion)
-
-
-def manual(seed, rate_deg_s=120.0, tilt_deg=0.5, n_poses=18, **sensor):
-    """The session of the manual's section 4: 18 poses by hand, then ±8π on three faces that are not parallel."""
-    rng = np.random.default_rng([13, seed])
-    tilt, lean = leaning(tilt_deg)
-    targets = [attitude(d, rng.uniform(0, 2 * np.pi)) for d in directions(n_poses, rng)]
-    steps = [Step(4.0)]
-    for target in targets[1:]:
-        steps += [Step(2.0, to=target), Step(4.0)]
-    for up in ((0.05, 0.02, 1.0), (1.0, -0.03, 0.04), (0.02, 1.0, 0.06)):
-        steps += [Step(2.5, to=lean @ attitude(up, rng.uniform(0, 2 * np.pi))), Step(4.0)]
-        for angle in (1440.0, -1440.0):
-            steps += [Step(abs(angle) / rate_deg_s / 0.92, turn=angle), Step(4.0)]
-    motion, per = move(steps, targets[0], rng, 50.0, tilt=tilt, tremor=np.radians(2.0))
-    return (*read_out(motion, per, rng, gyro_range=np.radians(300.0), **sensor), motion)

@@ -3,6 +3,8 @@
 They are computed by the core: importing SciPy takes longer than a calibration.
 """
 
+import math
+
 from trihedron import _core
 
 LEAST_P = 1e-300
@@ -27,6 +29,8 @@ def chdtri(dof: float, above: float) -> float:
     return _core.chi_square_upper(above, dof)
 
 
+LN_FAULT = math.log(1e4)
+"""Logarithm of the prior odds against a fault of one kind (a reset, a copied buffer, bus errors) in a log."""
 MEDIAN_CHI2 = {dof: chdtri(dof, 0.5) for dof in (1, 2)}
 """Median of a chi-square variate with 1 and 2 degrees of freedom, for robust scale estimates."""
 

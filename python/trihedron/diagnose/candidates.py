@@ -63,11 +63,12 @@ def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried
 
 
 def candidates_beside(
-    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str]
+    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str], least: float = -NEAR
 ) -> tuple[list[Tried], dict[str, str]]:
-    """Candidates to add to a hypothesis, best first; and the reasons why others do not apply."""
+    """Candidates to add to a hypothesis, best first, that score more than ``least`` at some strengths; and the reasons
+    why others do not apply."""
     offered, missing = offered_beside(model, effects, exclude)
-    leading = _leaders(model, offered, price_of_choice(model, effects))
+    leading = _leaders(model, offered, price_of_choice(model, effects), least)
     if not leading:
         return [], missing
     asked = model.with_added(leading)
@@ -131,15 +132,14 @@ def price_of_choice(model: Hypothesis, effects: Sequence[Effect]) -> float:
     return 2.0 * float(np.log(max(sum(one.unavailable(model.context) is None for one in effects), 1)))
 
 
-def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float) -> list[Term]:
+def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float, least: float) -> list[Term]:
     """Candidates that gain most one linear step from the fit, at its noise strengths and others, at their best size."""
     kept: list[tuple[Term, bool, FloatArray]] = []
     # A few at a time: the columns of all relations together need more memory than the log.
     for first in range(0, len(offered), AT_ONCE):
         terms = [term for effect in offered[first : first + AT_ONCE] for term in terms_of(model, effect, price)]
         looks = zip(terms, model.gains(terms, PRIOR_SCALES), strict=True)
-        # Refitted strengths raise the best of these by less than a full fit does.
-        may = [(term, look) for term, look in looks if 2.0 * float(look.gain.max()) - term.cost > -WORTH_FITTING]
+        may = [(term, look) for term, look in looks if 2.0 * float(look.gain.max()) - term.cost > least]
         kept = _ahead([*kept, *((term, _can_be(model, term, look), look.gain) for term, look in may)])
     scales = [PRIOR_SCALES[int(gain.max(axis=1).argmax())] for *_, gain in kept]
     return [term.scaled(scale) for (term, *_), scale in zip(kept, scales, strict=True)]

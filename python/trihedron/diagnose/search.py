@@ -20,6 +20,7 @@ from trihedron.diagnose.candidates import (
     all_beside,
     as_fits_best,
     candidates_beside,
+    price_of_choice,
     with_best,
     worth_fitting,
 )
@@ -144,7 +145,9 @@ class _Search:
         model, without, beside = self._beside_relations(model, without)
         stated, missing = all_beside(model, self.effects)
         # Results with noise strengths refitted replace those at the strengths of the answer, of an effect the best.
-        tried = [*reversed(stated), *reversed(candidates_beside(model, self.effects, ())[0])]
+        # Rivals of a bias process, which pays the same price, are those down to ``NEAR`` below it.
+        least = -NEAR - price_of_choice(model, self.effects)
+        tried = [*reversed(stated), *reversed(candidates_beside(model, self.effects, (), least)[0])]
         held = {term.effect.id for term in model.terms}
         return Found(
             model, beside, {one.term.effect.id: one for one in tried},

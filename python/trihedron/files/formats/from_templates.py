@@ -37,8 +37,6 @@ from trihedron.units import degrees_from_radians, mg_from_m_s2
 
 CORRELATION_S = 1e6
 """Eleven days, longer than any run, so that the bias is a random walk."""
-TAU_S = 500.0
-"""Arbitrary, because AirSim uses only ``stability/√tau``."""
 FIELDS = {"gyroscope": "angular_velocity", "accelerometer": "linear_acceleration"}
 Losses = Callable[[Calibration, ExportOptions], list[str]]
 
@@ -73,8 +71,6 @@ class Target:
         known = of_si_readings(calibration, self.title, options) if self.has_noise else calibration
         figures = required(known, options, self.title) if self.has_noise else NONE
         said = [*heading(known, self.equation), *self.losses(known, options)]
-        if name == "airsim":
-            return airsim(figures, said)
         accel = Sensor("accelerometer", known.accelerometer, figures.four[:2])
         gyro = Sensor("gyroscope", known.gyroscope, figures.four[2:])
         sensors = [accel] if known.gyroscope is None else [accel, gyro]
@@ -116,6 +112,8 @@ def templates() -> Any:
     made.filters |= {
         "number": lambda value: number(float(value)),
         "short": short,
+        "json": partial(json.dumps, indent=2),
+        "mg": mg_from_m_s2,
         "deg": degrees_from_radians,
         "row": row,
         "yaml": lambda values, indent: "\n".join(matrix_rows(values, indent)),
@@ -125,27 +123,6 @@ def templates() -> Any:
         "diagonal": lambda value: row(value * np.eye(3).ravel()),
     }
     return made
-
-
-def airsim(figures: Figures, said: list[str]) -> str:
-    """The ``Sensors`` entry of a vehicle.
-
-    AirSim: noise of an IMU in ``settings.json``, in deg/√h, deg/h, mg and µg by its keys; no bias and no scale.
-    Its bias is a random walk of ``stability/√tau`` per √s, so ``stability = K √tau``. By ImuSimple and ImuSimpleParams
-    of https://github.com/microsoft/AirSim.
-    """
-    root = math.sqrt(TAU_S)
-    imu = {
-        "SensorType": 2,
-        "Enabled": True,
-        "AngularRandomWalk": degrees_from_radians(figures.gyro_N.value) * 60.0,
-        "GyroBiasStabilityTau": TAU_S,
-        "GyroBiasStability": degrees_from_radians(figures.gyro_K.value * root) * 3600.0,
-        "VelocityRandomWalk": mg_from_m_s2(figures.accel_N.value),
-        "AccelBiasStabilityTau": TAU_S,
-        "AccelBiasStability": 1e3 * mg_from_m_s2(figures.accel_K.value * root),
-    }
-    return json.dumps({"Sensors": {"Imu": imu}, "written_by_trihedron": said}, indent=2) + "\n"
 
 
 def lost_in_simulation(

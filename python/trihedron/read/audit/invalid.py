@@ -15,6 +15,7 @@ from trihedron import _core
 from trihedron.arrays import AXES, TINY, BoolArray, FloatArray, IntArray
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.channel_facts.static_axes import adc_steps
+from trihedron.probability import LN_FAULT
 from trihedron.quantiles import median
 from trihedron.ranges import edges_of
 from trihedron.read.audit.readings import short
@@ -22,8 +23,6 @@ from trihedron.read.audit.repeats import Repeats, copied_rows, longest_by_chance
 from trihedron.read.sensors import Sensors
 from trihedron.records import Finding, FindingCode, Severity
 
-LN_RARE = -np.log(1e4)
-"""Logarithm of the prior odds that a log has invalid readings of one kind."""
 LONG, HALF = 0.1, 0.5
 """Shares of a log that are invalid, from which on the finding is serious, and nothing is excluded."""
 
@@ -136,7 +135,7 @@ def isolated_rows(readings: FloatArray, noise: FloatArray, step: FloatArray) -> 
     shares = np.linspace(0.005, 0.995, 100)
     evidence = np.logaddexp(np.log(shares) + ratio[:, None], np.log1p(-shares)).sum(axis=0)
     best = int(evidence.argmax())
-    if np.logaddexp.reduce(evidence) - np.log(len(shares)) + LN_RARE > 0.0:
+    if np.logaddexp.reduce(evidence) - np.log(len(shares)) > LN_FAULT:
         out[at[ratio + np.log(shares[best] / (1.0 - shares[best])) > _LN_SURE]] = True
     return out
 
@@ -172,7 +171,7 @@ def wrapped_rows(values: FloatArray, noise: float) -> BoolArray:
         span = max(median(sizes[ratio > 0.0]), span) if np.any(ratio > 0.0) else span
     # A jump beside another one is there and back: an isolated reading, which proves no range.
     is_run = ~np.isin(at - 1, at) & ~np.isin(at + 1, at)
-    if ratio[is_run & (ratio > 0.0)].sum() + LN_RARE <= 0.0:
+    if ratio[is_run & (ratio > 0.0)].sum() <= LN_FAULT:
         return out
     turns = np.concatenate([[0], np.cumsum(np.round(change / span))])
     kinds, count = np.unique(turns, return_counts=True)

@@ -15,13 +15,11 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.probability import MEDIAN_CHI2
+from trihedron.probability import LN_FAULT, MEDIAN_CHI2
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode
 
-LN_CHANGE = math.log(1e4)
-"""Logarithm of the prior odds against such a change in a log."""
 GYRO_RATIOS = (1.0, 2.0, 4.0, 8.0, 180.0 / math.pi)
 FORCE_RATIOS = (1.0, 2.0, 4.0, 8.0, 9.80665)
 """Ratios between the settings of one sensor: its ranges, and the usual units."""
@@ -297,7 +295,7 @@ def _most_likely(density: FloatArray, disturbed: float) -> _Path:
     lost = math.log(DISTURBED) + disturbed
     scores = np.logaddexp(math.log1p(-DISTURBED) + density, lost)
     n, s = scores.shape
-    price = LN_CHANGE + math.log(n * s)
+    price = LN_FAULT + math.log(n * s)
     best, came = scores[0], np.zeros((n, s), dtype=np.int64)
     for k in range(1, n):
         other = int(best.argmax())

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.probability import LN_FAULT
 from trihedron.quantiles import quantile
 
 CHUNK = 1 << 20
@@ -51,8 +52,6 @@ def longest_by_chance(n: int, probability: float) -> float:
 
 FARTHEST = 1024
 """Most rows between a block and its copy: buffers of sensors and of DMA hold fewer."""
-LN_RARE = math.log(1e4)
-"""Logarithm of the prior odds against such a block in a log."""
 
 
 def copied_rows(readings: FloatArray) -> BoolArray:
@@ -61,7 +60,7 @@ def copied_rows(readings: FloatArray) -> BoolArray:
     A row that equals a single one of the last ``FARTHEST`` equals by chance the one at a given distance once in as many
     rows: with each of a run at one distance the evidence of a copy grows by that.
     """
-    least = math.ceil((LN_RARE + math.log(max(len(readings), 1) * FARTHEST)) / math.log(FARTHEST))
+    least = math.ceil((LN_FAULT + math.log(max(len(readings), 1) * FARTHEST)) / math.log(FARTHEST))
     out = np.zeros(len(readings), dtype=np.bool_)
     for first, stop in _core.triad_copies(readings, FARTHEST, least):
         out[first:stop] = True

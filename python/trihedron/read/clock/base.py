@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.probability import LN_FAULT
 from trihedron.read.clock.rate import RESET, modulus_of, steps_of, usual_step
 from trihedron.read.clock.unit import Witness, seconds_of, time_unit
 from trihedron.read.errors import ReadError
@@ -113,9 +114,6 @@ def build_clock(
 
 MAX_DISPLACEMENT = 64
 """Largest number of rows by which a packet may be late; a larger one means another recording."""
-LN_SET = np.log(1e4)
-"""Logarithm of the prior odds against a clock that is set back; an uneven step is e times less likely than an even one,
-at least. Timestamps of arrival that overtake one another have uneven steps in either order."""
 PART = 1 << 20
 """Rows of a long log that are processed together."""
 
@@ -153,14 +151,16 @@ def never_set_back(
 ) -> FloatArray:
     """Timestamps that continue by a usual step where the clock was set back; as they are where rows are late.
 
-    Sorting gives late rows even steps; rows of a clock that was set back have them in the order of the file.
+    Sorting gives late rows even steps; rows of a clock that was set back have them in the order of the file. An uneven
+    step is e times less likely than an even one, at least; timestamps of arrival that overtake one another have uneven
+    steps in either order.
     """
     step, usual = np.diff(raw), usual_step(raw)
     back = np.flatnonzero(step < 0)
     order = np.argsort(raw, kind="stable")
     is_far = np.abs(order - np.arange(len(order))).max() > MAX_DISPLACEMENT
     gain = _n_uneven(np.diff(raw[order]), usual) - _n_uneven(step, usual)
-    if is_far or gain < LN_SET:
+    if is_far or gain < LN_FAULT:
         return raw
     lifts = np.zeros(len(raw))
     lifts[back + 1] = usual - step[back]
