@@ -49,20 +49,20 @@ impl Hasher for Mixed {
 
 fn of_share(rows: &[[f64; 3]], start: usize, farthest: usize, least: usize) -> Vec<Range<usize>> {
     let mut out = Vec::new();
-    let mut seen: HashMap<Key, (usize, usize), BuildHasherDefault<Mixed>> = HashMap::default();
+    let mut seen: HashMap<Key, (usize, usize), BuildHasherDefault<Mixed>> =
+        HashMap::with_capacity_and_hasher(SHARE + farthest, BuildHasherDefault::default());
     let mut run = (0, 0, 0);
     let stop = (start + SHARE).min(rows.len());
     for row in start.saturating_sub(farthest)..=stop {
         let (mut apart, mut is_single) = (0, false);
         if let Some(key) = key(rows, row).filter(|_| row < stop) {
             let far = |other: usize| other + farthest < row + 1;
-            if let Some((last, before)) = seen.insert(key, (row + 1, 0)) {
-                seen.insert(key, (row + 1, last));
-                if !far(last) {
-                    apart = row + 1 - last;
-                    is_single = before == 0 || far(before);
-                }
+            let (last, before) = seen.entry(key).or_default();
+            if *last > 0 && !far(*last) {
+                apart = row + 1 - *last;
+                is_single = *before == 0 || far(*before);
             }
+            (*before, *last) = (*last, row + 1);
         }
         if row < start {
             continue;

@@ -8,6 +8,8 @@ pub use copies::copies;
 pub use leaps::{Leap, leaps};
 pub use repeats::{Repeats, WINDOW, repeats};
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 /// Rows that a thread takes at a time; a whole number of windows.
@@ -99,6 +101,44 @@ fn extremes_of_axis(rows: &[[f64; 3]], axis: usize) -> Extremes {
     }
 }
 
+/// The largest change of each axis from one reading to the next; missing readings are skipped.
+#[must_use]
+pub fn largest_steps(rows: &[[f64; 3]]) -> [f64; 3] {
+    // A share begins at the last row of the one before.
+    let parts: Vec<[f64; 3]> = (0..rows.len().div_ceil(SHARE))
+        .into_par_iter()
+        .map(|k| {
+            let first = (k * SHARE).saturating_sub(1);
+            largest_of_share(rows, first..((k + 1) * SHARE).min(rows.len()))
+        })
+        .collect();
+    parts.into_iter().fold([0.0; 3], |all, part| {
+        std::array::from_fn(|axis| f64::max(all[axis], part[axis]))
+    })
+}
+
+fn largest_of_share(rows: &[[f64; 3]], share: Range<usize>) -> [f64; 3] {
+    let (before, share) = (&rows[..share.start], &rows[share]);
+    std::array::from_fn(|axis| {
+        let known = |row: &&[f64; 3]| row[axis].is_finite();
+        let start = share.first().filter(known);
+        let start = start.or_else(|| before.iter().rev().find(known));
+        let mut last = start.map_or(f64::NAN, |row| row[axis]);
+        let mut largest = 0.0;
+        for row in share {
+            // NaN is no step, and the reading before stays the last one.
+            let step = (row[axis] - last).abs();
+            largest = if step > largest { step } else { largest };
+            last = if row[axis].is_finite() {
+                row[axis]
+            } else {
+                last
+            };
+        }
+        largest
+    })
+}
+
 /// Readings near an extreme value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Near {
@@ -143,5 +183,23 @@ pub fn near(rows: &[[f64; 3]], axis: usize, value: f64, depth: f64) -> Near {
         count: parts.iter().map(|p| p.count).sum(),
         width: parts.iter().map(|p| p.width).fold(f64::INFINITY, f64::min),
         at: parts.into_iter().flat_map(|p| p.at).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SHARE, largest_steps};
+
+    #[test]
+    fn the_largest_step_skips_missing_readings_and_crosses_shares() {
+        let mut rows = vec![[0.0; 3]; 2 * SHARE];
+        rows[SHARE - 1] = [f64::NAN, 0.0, 0.0];
+        rows[SHARE - 2] = [-4.0, 0.0, 0.0];
+        rows[SHARE] = [3.0, 2.0, 0.0];
+        assert_eq!(
+            largest_steps(&rows).map(f64::to_bits),
+            [7.0, 2.0, 0.0].map(f64::to_bits)
+        );
+        assert!(largest_steps(&[]).iter().all(|step| *step == 0.0));
     }
 }

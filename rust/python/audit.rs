@@ -9,6 +9,7 @@ use crate::audit;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(triad_extremes, module)?)?;
+    module.add_function(wrap_pyfunction!(triad_largest_steps, module)?)?;
     module.add_function(wrap_pyfunction!(triad_repeats, module)?)?;
     module.add_function(wrap_pyfunction!(triad_leaps, module)?)?;
     module.add_function(wrap_pyfunction!(triad_copies, module)?)?;
@@ -27,6 +28,13 @@ fn triad_extremes(
         .iter()
         .map(|e| (e.low, e.n_low, e.high, e.n_high))
         .collect())
+}
+
+/// The largest change from one reading to the next of each axis of `(n, 3)` readings; missing ones are skipped.
+#[pyfunction]
+fn triad_largest_steps(py: Python<'_>, readings: PyReadonlyArray2<'_, f64>) -> PyResult<[f64; 3]> {
+    let flat = flat3("readings", &readings)?;
+    super::run(py, || Ok(audit::largest_steps(as_rows(&flat))))
 }
 
 type RepeatNumbers<'py> = (

@@ -88,13 +88,20 @@ def _triad(
 ) -> FloatArray | None:
     if triad is None:
         return None
-    out = _core.new_array(table.n_rows if rows is None else len(rows), 3)
-    for k, column in enumerate(triad):
-        values = table.columns[column]
+    axes = [table.columns[column] for column in triad]
+    for column, values in zip(triad, axes, strict=True):
         if not len(values):
             raise ReadError(
                 f"{table.path}: column {table.label(column)} contains words, not numbers; name another column."
             )
+    shared = axes[0].base
+    # Axes that the reader wrote side by side are the triad; an array of the user's is not changed, but copied.
+    if rows is None and table.first_line and isinstance(shared, np.ndarray) and shared.shape[1:] == (3,):
+        block: FloatArray = shared[: table.n_rows]
+        if [values.ctypes.data for values in axes] == [axis.ctypes.data for axis in block.T]:
+            return block
+    out = _core.new_array(table.n_rows if rows is None else len(rows), 3)
+    for k, values in enumerate(axes):
         out[:, k] = values if rows is None else values[rows]
     return out
 

@@ -39,7 +39,7 @@ def without_invalid(sensors: Sensors, rate_hz: float) -> tuple[Sensors, list[Fin
     for sensor, readings in sensors.triads.items():
         step = adc_steps(readings)
         noise = np.maximum(np.maximum(windows.quiet_noise(sensor), step), TINY)
-        over = np.any([wrapped_rows(readings[:, k], float(noise[k])) for k in range(3)], axis=0)
+        over = wrapped_rows(readings, noise)
         alone = np.zeros(len(over), dtype=np.bool_)
         alone[~over] = isolated_rows(readings[~over] if over.any() else readings, noise, step)
         wrapped.append(over)
@@ -147,21 +147,27 @@ _RANGE = 100.0
 """Smallest range of a code in noise of one sample: eight bits whose last one the noise moves have more."""
 
 
-def wrapped_rows(values: FloatArray, noise: float) -> BoolArray:
-    """(n,) readings of one axis (n,) that differ from the motion by the range of their code.
+def wrapped_rows(readings: FloatArray, noise: FloatArray) -> BoolArray:
+    """(n,) rows of a triad (n, 3) in which an axis differs from the motion by the range of its code."""
+    out = np.zeros(len(readings), dtype=np.bool_)
+    ends = _core.triad_extremes(readings)
+    for k, (step, (low, _, high, _)) in enumerate(zip(_core.triad_largest_steps(readings), ends, strict=True)):
+        if high - low >= _RANGE * noise[k] and step > 0.5 * (high - low):
+            out |= _wrapped(readings[:, k], float(noise[k]), high - low)
+    return out
+
+
+def _wrapped(values: FloatArray, noise: float, span: float) -> BoolArray:
+    """(n,) readings of one axis (n,), which covers ``span``, that differ from the motion by the range of their code.
 
     Its jumps are all of one size, that of the range, to within the unevenness of the motion beside them.
     """
     out = np.zeros(len(values), dtype=np.bool_)
     present = np.flatnonzero(np.isfinite(values))
-    x = values[present]
-    change = np.diff(x)
-    if len(x) < FEWEST or np.ptp(x) < _RANGE * noise:
+    change = np.diff(values[present])
+    at = 2 + np.flatnonzero(np.abs(change[2:-2]) > 0.5 * span)
+    if len(present) < FEWEST or len(at) < 2:
         return out
-    at = 2 + np.flatnonzero(np.abs(change[2:-2]) > 0.5 * np.ptp(x))
-    if len(at) < 2:
-        return out
-    span = float(np.ptp(x))
     # The readings stop short of the range, by the motion's own step: the second round has it.
     for _ in range(2):
         moved = change - span * np.round(change / span)

@@ -62,11 +62,11 @@ def _jump(time_s: FloatArray) -> tuple[int, float] | None:
     n = (len(time_s) - 1) // _PARTS
     if n < _FEWEST_ROWS:
         return None
-    step = np.diff(time_s)
-    step = np.where(step < GAP_STEPS * usual_step(time_s), step, np.nan)[: n * _PARTS].reshape(_PARTS, n)
-    if not np.isfinite(step).any(axis=1).all():
+    longest = GAP_STEPS * usual_step(time_s)
+    parts = [_core.inside_steps(time_s[k * n : (k + 1) * n + 1], -np.inf, longest) for k in range(_PARTS)]
+    if not all(count for count, *_ in parts):
         return None
-    pace = np.nanmean(step, axis=1)
+    pace = np.array([total / count for count, total, *_ in parts])
     best: tuple[float, int] | None = None
     for k in range(4, _PARTS - 4):
         # The part with the change belongs to neither side.
@@ -80,7 +80,8 @@ def _jump(time_s: FloatArray) -> tuple[int, float] | None:
     ratio = float(pace[k + 1 :].mean() / pace[: k - 1].mean())
     if contrast < _ABRUPT or abs(ratio - 1.0) < _SMALLEST:
         return None
-    inside = np.nan_to_num(step[k - 1 : k + 1].ravel(), nan=float(pace.mean()))
+    inside = np.diff(time_s[(k - 1) * n : (k + 1) * n + 1])
+    inside = np.where(inside <= longest, inside, pace.mean())
     sums = np.cumsum(inside - inside.mean())
     return (k - 1) * n + int(np.argmax(np.abs(sums))) + 1, ratio
 

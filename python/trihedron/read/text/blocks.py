@@ -83,13 +83,13 @@ def as_plain(path: Path, data: bytes) -> bytes:
     return data
 
 
-def blocks(path: Path, data: bytes, start: int) -> Iterator[bytes]:
-    """Parts of a text from byte ``start`` on, each of which ends with a complete line."""
+def blocks(path: Path, data: bytes, start: int) -> Iterator[tuple[int, int]]:
+    """First bytes of parts of a text from byte ``start`` on, and of the next ones; each ends with a complete line."""
     while start < len(data):
         stop = data.find(b"\n", start + BLOCK_BYTES) + 1 or len(data)
         if stop - start > 2 * BLOCK_BYTES:
             raise ReadError(f"{path}: no line end in {(stop - start) / 1e6:.0f} MB: this is not a text log.")
-        yield data[start:stop]
+        yield start, stop
         start = stop
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
@@ -27,7 +28,8 @@ class TextReader:
 
     def __init__(self, path: Path, sha256: str, progress: Progress | None, lines: IntArray | None = None) -> None:
         self.path, self.sha256, self.progress, self.true_lines = path, sha256, progress, lines
-        self.columns: list[FloatArray] = []
+        self.blocks: list[FloatArray] = []
+        self.places: list[tuple[int, int]] = []
         self.n_rows = 0
         self.lines: list[IntArray | range] = []
         self.texts: dict[int, TextColumn] = {}
@@ -45,22 +47,32 @@ class TextReader:
         start = 0
         for _ in range(layout.first_line - 1):
             start = data.find(b"\n", start) + 1
-        most = data.count(b"\n", start) + 1
-        check_memory(self.path, most, layout.n_fields)
-        # Memory that is never written to is not used.
-        self.columns = [_core.new_array(most, 1) for _ in range(layout.n_fields)]
-        line, done = layout.first_line, start
-        for block in blocks(self.path, data, start):
-            done += len(block)
+        codes = np.frombuffer(data, dtype=np.uint8)
+        self._make_room(_core.plain_table_into(codes[start:], 0, [], [])[0], layout)
+        line = layout.first_line
+        for first, stop in blocks(self.path, data, start):
             # Nearly all blocks contain only rows of numbers and need no further checks.
-            n_lines = self._plain(block, layout, line)
+            n_lines = self._plain(codes[first:stop], layout, line)
             if not n_lines:
-                self._block(block, layout, line, is_last=done == len(data))
+                block = data[first:stop]
+                self._block(block, layout, line, is_last=stop == len(data))
                 n_lines = block.count(b"\n")
             line += n_lines
             if self.progress is not None:
-                self.progress(done / len(data), f"reading {self.path.name}: {self.n_rows} rows")
+                self.progress(stop / len(data), f"reading {self.path.name}: {self.n_rows} rows")
         return self._table(layout)
+
+    def _make_room(self, most: int, layout: Layout) -> None:
+        """Memory for ``most`` rows: of the axes of a sensor together, as its readings (n, 3) are, of others alone."""
+        check_memory(self.path, most, layout.n_fields)
+        groups: dict[tuple[str, str] | int, list[int]] = {}
+        for i in range(layout.n_fields):
+            name = parse_name(layout.name(i))
+            groups.setdefault((name.role, name.group) if name.axis else i, []).append(i)
+        # Memory that is never written to is not used.
+        self.blocks = [_core.new_array(most, len(group)) for group in groups.values()]
+        places = {i: (j, k) for j, group in enumerate(groups.values()) for k, i in enumerate(group)}
+        self.places = [places[i] for i in range(layout.n_fields)]
 
     def line(self, number: int) -> int:
         """Line in the file of a line of the content."""
@@ -96,15 +108,13 @@ class TextReader:
         )
         return layout
 
-    def _plain(self, block: bytes, layout: Layout, line: int) -> int:
+    def _plain(self, block: npt.NDArray[np.uint8], layout: Layout, line: int) -> int:
         """Read a block that contains only rows of numbers, as in most logs; their number, 0 where it has others."""
         # One irregular block may be the incomplete last one; after two, further blocks are not tested.
         if self.n_odd_blocks > 1 or self.texts or layout.decimal_comma or self.true_lines is not None:
             return 0
-        room = [column[self.n_rows :] for column in self.columns]
-        places = [(i, 0) for i in range(len(room))]
-        codes = np.frombuffer(block, dtype=np.uint8)
-        rows, is_read = _core.plain_table_into(codes, ord(layout.separator), places, room)
+        room = [columns[self.n_rows :] for columns in self.blocks]
+        rows, is_read = _core.plain_table_into(block, ord(layout.separator), self.places, room)
         if is_read:
             self.n_rows += rows
             self.lines.append(range(line, line + rows))
@@ -156,7 +166,8 @@ class TextReader:
                     f"{self.path}: {len(lines)} lines from line {lines[0]} on give {len(cells)} rows; "
                     "look for quotes that are opened and never closed."
                 )
-            column = self.columns[i][:, 0]
+            block, k = self.places[i]
+            column = self.blocks[block][:, k]
             if i not in self.texts:
                 column[n:stop], words = numbers(cells, layout.decimal_comma)
                 if not words.any():
@@ -187,7 +198,7 @@ class TextReader:
             at, count = self.line(self.comments[0]), len(self.comments)
             self.findings.append(Finding.of(FindingCode.ROWS_LEFT_OUT, "remarks", rows_left_out=count, line=at))
         names = [layout.name(i) for i in range(layout.n_fields)]
-        columns = [column[: self.n_rows, 0] for column in self.columns]
+        columns = [self.blocks[block][: self.n_rows, k] for block, k in self.places]
         has_time = any(parse_name(name).role == "time" for name in names)
         for i, text in self.texts.items():
             if i in words:
