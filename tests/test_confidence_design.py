@@ -15,7 +15,7 @@ from confidence.sessions import table
 from trihedron import calibrate
 from trihedron.api.planning import POSE_SETS
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
-from trihedron.records import FindingCode, Recording
+from trihedron.records import Recording
 from trihedron.simulate import scenario_by_name, simulate, table_turns
 from turns_alone import turned
 
@@ -120,7 +120,7 @@ def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
     n_poses = len(motion.rests)
     up = [face for face in (1, -1, 2, -2, 3, -3) for _ in range(n_poses // 6)]
     result = calibrate(log, gravity_m_s2=G, method="faces", faces=[*up[:-1], 0])
-    left_out = next(one for one in result.findings if one.code is FindingCode.POSE_NOT_A_FACE)
+    left_out = next(one for one in result.findings if one.code == "pose-not-a-face")
     assert f"poses {n_poses}" in left_out.seen
     with pytest.raises(ValueError, match=f"faces must be {n_poses} numbers"):
         calibrate(log, gravity_m_s2=G, method="faces", faces=up[:-1])

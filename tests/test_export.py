@@ -15,7 +15,7 @@ from trihedron.cli import main
 from trihedron.files.calibration import write_calibration
 from trihedron.files.formats import ExportOptions, NoiseFigure, SensorNoise, export_files, targets
 from trihedron.files.formats.imu_tk import upper_frame
-from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, SensorCalibration, Severity
 from trihedron.sensor_model import in_frame
 
 READINGS = np.random.default_rng(5).normal(size=(40, 3)) * 8.0
@@ -299,7 +299,7 @@ def test_pyins_distorts_truth_into_the_readings():
 def test_every_export_says_when_the_calibration_is_not_to_be_trusted_or_has_no_gyro(target):
     known = calibration()
     assert export_calibration(replace(known, gyroscope=None, covariance=np.zeros((12, 12))), target, IN_LSB)
-    serious = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "it did not settle.")
+    serious = Finding("not-converged", Severity.SERIOUS, "it did not settle.")
     assert "NOT TO BE TRUSTED" in export_calibration(replace(known, findings=(serious,)), target, IN_LSB)
 
 

@@ -9,7 +9,7 @@ from scipy import stats
 import twins_kalman as twins
 from trihedron import _core
 from trihedron.estimate.kalman.per_axis import calibrate_with_references, check_innovations, shaping_model
-from trihedron.records import AxisNoise, FindingCode, PoseTable
+from trihedron.records import AxisNoise, PoseTable
 
 SIGMA = 0.11 * 0.032002 / twins.GRAVITY
 """The article's ADC noise of 0.11 m/s² in volts."""
@@ -159,9 +159,9 @@ def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars
     ("true", "believed", "code"),
     [
         (ARTICLE_MIX, ARTICLE_MIX, None),
-        (ARTICLE_MIX, ARTICLE_MIX.scaled(0.5), FindingCode.INNOVATIONS_TOO_LARGE),
-        (ARTICLE_MIX, ARTICLE_MIX.scaled(2.0), FindingCode.INNOVATIONS_TOO_SMALL),
-        (WALKING, AxisNoise(white=1.5 * SIGMA * 5**0.5), FindingCode.INNOVATIONS_CORRELATED),
+        (ARTICLE_MIX, ARTICLE_MIX.scaled(0.5), "innovations-too-large"),
+        (ARTICLE_MIX, ARTICLE_MIX.scaled(2.0), "innovations-too-small"),
+        (WALKING, AxisNoise(white=1.5 * SIGMA * 5**0.5), "innovations-correlated"),
     ],
     ids=["right", "half", "double", "white only"],
 )

@@ -17,7 +17,7 @@ from trihedron.estimate.kalman.norm_invariant import calibrate_without_reference
 from trihedron.estimate.kalman.per_axis import shaping_model
 from trihedron.estimate.kalman.session import calibrate_session, noise_from_poses, pose_readings
 from trihedron.read import ReadError, read_axis_noise, read_pose_table
-from trihedron.records import AxisNoise, FindingCode, PoseTable, Recording
+from trihedron.records import AxisNoise, PoseTable, Recording
 from trihedron.segment import segment_recording
 from trihedron.simulate import Clock, NoiseTerms, Scenario, dividing_head, long_static, scenario_by_name, simulate
 from trihedron.simulate.accelerometer import Accelerometer
@@ -48,7 +48,7 @@ def test_a_simulated_dividing_head_gives_the_instrument_back(head, table):
     # 12 degrees of freedom: mean 12, standard deviation 4.9; 40 is beyond the 99.99 % limit of 39.1.
     assert normalised_error_squared(error, result.accelerometer.covariance) < 40.0
     assert np.max(result.accelerometer.sigma_S) < 1e-3
-    assert {f.code for f in result.findings} == {FindingCode.NOISE_ASSUMED}
+    assert {f.code for f in result.findings} == {"noise-assumed"}
 
 
 def test_pose_numbers_pick_poses_and_a_mismatch_is_said(head, table):
@@ -259,9 +259,9 @@ def test_nine_poses_for_nine_parameters_test_nothing():
     at_s = 10.0 * np.arange(9)
     found = calibrate_without_references(readings, NOISE, start_s=at_s, pose_s=np.full(9, 4.0), gravity_m_s2=GRAVITY)
     assert found.consistency.n == 0
-    assert {one.code for one in found.findings} == {FindingCode.FEW_POSES}
+    assert {one.code for one in found.findings} == {"few-poses"}
     _, alone = calibrate_norm(readings, np.full((9, 3), 0.01), GRAVITY, raw_unit="counts")
-    assert FindingCode.FEW_POSES in {one.code for one in alone}
+    assert "few-poses" in {one.code for one in alone}
 
 
 def test_as_many_poses_as_parameters_give_a_page_that_says_that_nothing_tests_them(tmp_path):

@@ -16,8 +16,8 @@ import typer
 
 import trihedron
 from trihedron.cli import COMMANDS, build_app
-from trihedron.records.finding import FindingCode
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
+from trihedron.report.findings.catalogue import ENTRIES
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "python/trihedron"
@@ -158,7 +158,7 @@ def test_nothing_that_a_user_reads_uses_a_retired_word(source):
 
 
 def test_no_public_name_and_no_key_of_a_file_is_a_retired_word():
-    names = {*(code.value for code in FindingCode), *EFFECTS}
+    names = {*(entry.code for entry in ENTRIES), *EFFECTS}
     for path in (PACKAGE / "files/schema").glob("*.json"):
         names |= set(re.findall(r'"(\w+)":', path.read_text(encoding="utf-8")))
     for name in filter(str.isidentifier, trihedron.__all__):

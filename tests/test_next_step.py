@@ -10,7 +10,7 @@ import pytest
 from trihedron.cli import main
 from trihedron.cli import run as now
 from trihedron.cli.options import GravitySource, LogSource
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.document import Document
 
@@ -89,7 +89,7 @@ def test_a_command_names_all_logs_and_repeats_no_output():
 
 
 def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_stored():
-    weak = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "Seen.", "", "Add poses.")
+    weak = Finding("not-observable", Severity.SERIOUS, "Seen.", "", "Add poses.")
     found, effect = found_with("disturbed-pose", is_of_unit=False)
     assert "--extended" not in next_step_in_words(found)
     effect.model = {"applies_to_other_recordings": True}
@@ -97,12 +97,12 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
     # What still disagrees with the effects would make their calibration untrusted.
     effect.model = {"applies_to_other_recordings": False}
     effect.id, effect.held_out = "dropped-samples", (SimpleNamespace(domain="moves"),)
-    above = Finding(FindingCode.RESIDUAL_ABOVE_NOISE, Severity.SERIOUS, "Seen.", "", "See `trihedron diagnose LOG`.")
+    above = Finding("residual-above-noise", Severity.SERIOUS, "Seen.", "", "See `trihedron diagnose LOG`.")
     found.calibration = SimpleNamespace(findings=(above,))
     assert "--extended" in next_step_in_words(found)
     found.remaining = (DISAGREES,)
     assert "--extended" not in next_step_in_words(found)
-    found.findings = (Finding(FindingCode.NOT_FIT, Severity.WARNING, "Two orientations.", "", ""),)
+    found.findings = (Finding("not-fit", Severity.WARNING, "Two orientations.", "", ""),)
     assert "trihedron calibrate" not in next_step_in_words(found)
     found.findings = ()
     found.calibration = SimpleNamespace(findings=(weak,))
@@ -110,7 +110,7 @@ def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_sto
 
 
 def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
-    lost = Finding(FindingCode.LOSSES_POSSIBLE, Severity.SERIOUS, "Seen.", "", "Record again.")
+    lost = Finding("losses-possible", Severity.SERIOUS, "Seen.", "", "Record again.")
     moves = SimpleNamespace(domain="moves", disagrees=False)
     own = SimpleNamespace(findings=(lost,))
     found, _ = found_with(
@@ -144,7 +144,7 @@ def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():
 
 def test_a_calibration_less_certain_than_that_of_the_log_is_replaced_though_its_uncertainty_allows_its_errors():
     agrees = SimpleNamespace(significant=False, id="accel-scale")
-    imprecise = Finding.of(FindingCode.CALIBRATION_IMPRECISE, "static", times=26.0, p=1e-9)
+    imprecise = Finding.of("calibration-imprecise", "static", times=26.0, p=1e-9)
     for findings, is_kept in (((), True), ((imprecise,), False)):
         found = SimpleNamespace(verdict="consistent", parameters=(agrees,), findings=findings)
         assert next_step_in_words(found, "cal.json").startswith("Keep using cal.json") == is_kept

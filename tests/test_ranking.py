@@ -10,10 +10,10 @@ import trihedron
 from test_export import export_calibration
 from trihedron.cli import main
 from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
-from trihedron.records import FindingCode, Recording, Severity
+from trihedron.records import Recording, Severity
 from trihedron.report.ranking import said_of
 
-RATE = FindingCode.STATIC_RATE_ABOVE_NOISE
+RATE = "static-rate-above-noise"
 
 
 def check_ranked(known, log, gravity):
@@ -106,12 +106,12 @@ def test_verify_rejects_a_gyro_bias_that_is_wrong_and_what_is_worse_than_nothing
     wide = {"accelerometer": sensors[0], "gyroscope": sensors[1]}
     assert trihedron.verify(known, log, gravity_m_s2=9.81).is_passed
     for off, code in (
-        (replace(known, gyroscope=replace(w, b=w.b + np.radians(5.0))), FindingCode.CALIBRATION_SHIFT),
-        (replace(known, **wide, covariance=1e4 * known.covariance), FindingCode.WORSE_THAN_UNCALIBRATED),
+        (replace(known, gyroscope=replace(w, b=w.b + np.radians(5.0))), "calibration-shift"),
+        (replace(known, **wide, covariance=1e4 * known.covariance), "worse-than-uncalibrated"),
     ):
         result = trihedron.verify(off, log, gravity_m_s2=9.81)
         assert not result.is_passed
-        found = [one for one in result.findings if one.code is code and one.severity is Severity.SERIOUS]
+        found = [one for one in result.findings if one.code == code and one.severity is Severity.SERIOUS]
         assert found
         # Five degrees per second beside hundredths.
         assert all(one.numbers.get("times_expected", 20.0) > 10.0 for one in found)
@@ -161,7 +161,7 @@ def test_a_gyro_bias_that_drifts_within_the_log_is_a_warning_of_its_verification
     log, known = session
     counts = np.radians(0.06) / np.abs(np.diag(known.gyroscope.S)) * (log.time_s / log.time_s[-1])[:, None]
     found = [
-        [f.severity for f in trihedron.verify(known, one, gravity_m_s2=9.81).findings if f.code is RATE]
+        [f.severity for f in trihedron.verify(known, one, gravity_m_s2=9.81).findings if f.code == RATE]
         for one in (log, replace(log, gyroscope=log.gyroscope + counts))
     ]
     assert found == [[], [Severity.WARNING]]
@@ -172,7 +172,7 @@ def test_verify_names_the_one_scale_that_is_wrong_and_does_not_suspect_gravity(s
     a = known.accelerometer
     off = replace(known, accelerometer=replace(a, S=np.diag([1.0, 1.05, 1.0]) @ a.S))
     found = trihedron.verify(off, log, gravity_m_s2=9.81).findings
-    causes = [one.cause for one in found if one.code is FindingCode.RESIDUAL_ABOVE_NOISE]
+    causes = [one.cause for one in found if one.code == "residual-above-noise"]
     assert len(causes) == 1
     assert "accelerometer scale Y" in causes[0]
     assert "gravity" not in causes[0].lower()

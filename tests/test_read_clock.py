@@ -8,7 +8,7 @@ from trihedron.read import ReadError, read_recording
 from trihedron.read.clock.even import find_even_clock
 from trihedron.read.clock.settle import sample_numbers
 from trihedron.read.clock.unit import parse_time_unit, seconds_of
-from trihedron.records import FindingCode, Severity, TimestampKind
+from trihedron.records import Severity, TimestampKind
 from trihedron.records.recording import spread_timestamps
 
 N = 6000
@@ -79,11 +79,11 @@ def test_motion_shows_whether_samples_were_taken_evenly_or_when_stamped(tmp_path
     timestamps = arrival(np.arange(N), law, 2)
     by_clock = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, motion(even)]), HEADER))
     assert by_clock.sampling.is_even
-    assert FindingCode.EVEN_CLOCK in codes(by_clock)
+    assert "even-clock" in codes(by_clock)
     np.testing.assert_allclose(np.diff(by_clock.time_s), T, rtol=1e-3)
     by_timestamp = read_recording(write(tmp_path / "b.csv", np.column_stack([timestamps, motion(timestamps)]), HEADER))
     assert not by_timestamp.sampling.is_even
-    assert FindingCode.TIMESTAMPS_KEPT in codes(by_timestamp)
+    assert "timestamps-kept" in codes(by_timestamp)
     np.testing.assert_allclose(by_timestamp.time_s, timestamps - timestamps[0], atol=1e-9)
 
 
@@ -92,8 +92,8 @@ def test_without_motion_stamps_stay_and_the_doubt_is_said(tmp_path):
     still = motion(np.zeros(N))
     recording = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, still]), HEADER))
     assert not recording.sampling.is_even
-    assert "no motion shows" in finding(recording, FindingCode.CLOCK_UNDECIDED).seen
-    assert FindingCode.TIME_GAP not in codes(recording)
+    assert "no motion shows" in finding(recording, "clock-undecided").seen
+    assert "time-gap" not in codes(recording)
 
 
 def test_packets_with_one_stamp_are_spread_even_at_rest(tmp_path):
@@ -197,7 +197,7 @@ def log(rate_hz, unit_s, n=3000, poses=False, seed=1, whole=None):
 def test_poses_that_change_within_a_row_tell_a_log_of_many_seconds_a_row(tmp_path, rate_hz):
     recording = read_recording(write(tmp_path / "log.csv", log(rate_hz, 1.0, poses=True)))
     assert recording.rate_hz == pytest.approx(rate_hz, rel=1e-6)
-    assert finding(recording, FindingCode.TIME_UNIT_DETECTED).severity is Severity.NOTE
+    assert finding(recording, "time-unit-detected").severity is Severity.NOTE
 
 
 @pytest.mark.parametrize(("rate_hz", "unit_s"), [(1, 1.0), (4, 1.0), (100, 1e-3), (500, 1e-3), (1000, 1e-6)])
@@ -210,7 +210,7 @@ def test_seconds_of_a_slow_log_and_ticks_of_ordinary_rates_are_what_they_are(tmp
 def test_a_step_of_one_is_a_second_at_rest_and_in_doubt_and_a_millisecond_where_gravity_turns_smoothly(tmp_path):
     turning = read_recording(write(tmp_path / "log.csv", log(1000.0, 1e-3, 20000, poses=True)))
     assert turning.rate_hz == pytest.approx(1000, rel=1e-6)
-    found = finding(read_recording(write(tmp_path / "log.csv", log(1.0, 1.0))), FindingCode.TIME_UNIT_DETECTED)
+    found = finding(read_recording(write(tmp_path / "log.csv", log(1.0, 1.0))), "time-unit-detected")
     assert found.severity is Severity.SERIOUS  # a gyro's scale hangs on it
     assert "ms (1000 Hz)" in found.seen
     assert "--time-unit" in found.action
@@ -222,7 +222,7 @@ def test_whole_seconds_that_a_hundred_rows_share_are_seconds_beyond_doubt(tmp_pa
     recording = read_recording(write(tmp_path / "log.csv", table))
     # A row lasts the span over the rows: 10 ms, which no other unit makes plausible. A row a second would be a doubt.
     assert recording.rate_hz == pytest.approx(100.0, rel=0.02)
-    assert finding(recording, FindingCode.TIME_UNIT_DETECTED).severity is Severity.NOTE
+    assert finding(recording, "time-unit-detected").severity is Severity.NOTE
 
 
 def test_a_cycle_of_temperature_tells_microseconds_from_nanoseconds(tmp_path):

@@ -11,7 +11,7 @@ from test_read import HEADER, codes, finding, write
 from trihedron.read import read_recording
 from trihedron.read.names import parse_name
 from trihedron.read.turning import turning_of
-from trihedron.records import FindingCode, Severity
+from trihedron.records import Severity
 from trihedron.units import RateUnit
 
 RATE_HZ = 100.0
@@ -33,7 +33,7 @@ def test_the_gyro_unit_is_told_by_turning_gravity(tmp_path, scale, unit, turn_s)
     time_s, force, rate = motion(RATE_HZ, 3, 6, turn_s)
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate * scale))
     assert recording.gyroscope_unit is unit
-    assert FindingCode.UNIT_ASSUMED not in codes(recording)
+    assert "unit-assumed" not in codes(recording)
 
 
 def test_the_gyro_unit_depends_on_no_order_of_axes_and_one_that_contradicts_gravity_is_serious(tmp_path):
@@ -44,27 +44,27 @@ def test_the_gyro_unit_depends_on_no_order_of_axes_and_one_that_contradicts_grav
     recording = read_recording(path)
     # As the header says; but the contradiction is reported.
     assert recording.gyroscope_unit is RateUnit.DEG_S
-    assert finding(recording, FindingCode.UNIT_CONTRADICTED).severity is Severity.SERIOUS
+    assert finding(recording, "unit-contradicted").severity is Severity.SERIOUS
 
 
 @pytest.mark.parametrize("names", ["t,gx,gy,gz,ax,ay,az", "t [s],gx [rad/s],gy [rad/s],gz [rad/s],ax [m/s^2],ay,az"])
 def test_a_header_that_exchanges_the_sensors_is_named_with_the_columns_to_give(tmp_path, names):
     time_s, force, rate = motion(RATE_HZ, 3, 6, 1.0)
     path = saved(tmp_path / "log.csv", time_s, force, rate, f"{names}\n")
-    (found,) = [f for f in read_recording(path).findings if f.code is FindingCode.SENSORS_EXCHANGED]
+    (found,) = [f for f in read_recording(path).findings if f.code == "sensors-exchanged"]
     assert found.severity is Severity.SERIOUS
     recording = read_recording(path, columns=found.action.split("--columns ")[1].rstrip("."))
     np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
-    assert FindingCode.SENSORS_EXCHANGED not in {f.code for f in recording.findings}
+    assert "sensors-exchanged" not in {f.code for f in recording.findings}
 
 
 def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_serious(tmp_path):
     time_s, force, rate = (part[:200] for part in motion(RATE_HZ, 3, 1, 1.0))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate))
-    assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
+    assert finding(recording, "unit-assumed").severity is Severity.WARNING
     noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, noise, rate))
-    assert finding(recording, FindingCode.GRAVITY_MISSING).severity is Severity.SERIOUS
+    assert finding(recording, "gravity-missing").severity is Severity.SERIOUS
 
 
 @pytest.mark.parametrize("gyro_first", [False, True])
@@ -76,13 +76,13 @@ def test_six_columns_without_names_are_put_in_order_by_gravity(tmp_path, gyro_fi
     np.testing.assert_array_equal(recording.accelerometer, force)
     np.testing.assert_array_equal(recording.gyroscope, rate)
     severity = Severity.WARNING if gyro_first else Severity.NOTE
-    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is severity
+    assert finding(recording, "columns-assumed").severity is severity
 
 
 def test_an_undecidable_order_is_said_to_be_a_guess(tmp_path):
     noise = np.random.default_rng(6).standard_normal((500, 6))
     recording = read_recording(write(tmp_path / "log.txt", noise, "", separator=" "), rate_hz=RATE_HZ)
-    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is Severity.SERIOUS
+    assert finding(recording, "columns-assumed").severity is Severity.SERIOUS
 
 
 # Role, axis and unit → names; in other languages below, with letters that look like Latin ones, lost letters, and two
@@ -170,7 +170,7 @@ def test_an_axis_without_numbers_is_named(tmp_path):
     named = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
     read = trihedron.read(log_of(tmp_path, named, lambda row: [*row[:2], "north", *row[3:]]))
     assert read.accelerometer is None
-    words = next(one for one in read.findings if one.code is FindingCode.COLUMN_LEFT_OUT)
+    words = next(one for one in read.findings if one.code == "column-left-out")
     assert "'ay [m/s^2]' contains no numbers (such as north), so the accelerometer" in words.seen
     assert words.severity is Severity.WARNING
     with pytest.raises(trihedron.InputError, match=r"column 'ay' of the accelerometer contains no numbers"):
@@ -184,7 +184,7 @@ def test_a_contradicted_accelerometer_unit_is_answered_with_the_one_that_fits(tm
     log = write(
         tmp_path / "log.csv", table, "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]\n"
     )
-    found = finding(read_recording(log), FindingCode.UNIT_CONTRADICTED)
+    found = finding(read_recording(log), "unit-contradicted")
     assert f"--accel-unit {unit}" in found.action
 
 

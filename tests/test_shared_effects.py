@@ -13,7 +13,7 @@ from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.hypothesis import AddedTerms, Term
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.diagnose.shared import Information, agreement, together
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.report.shared_diagnosis import shared_diagnosis_report
 
 STRENGTHS = ((1.0, 1.0), (1.0,) * 4, (1.0, 1.0), (1.0, 1.0))
@@ -85,10 +85,10 @@ def test_healthy_recordings_share_nothing_and_one_not_with_itself_alone():
     assert found.effects == found.findings == ()
     assert "share no missing effect" in " ".join(str(found).split())
     several = sessions(0.0, 0.0, unit=None)
-    assert {one.code for one in several.findings} == {FindingCode.SEVERAL_DEVICES}
+    assert {one.code for one in several.findings} == {"several-devices"}
     assert shared_diagnosis_report(several).what_next.startswith("Diagnose the recordings of one unit")
     # One that is red by itself is named, and makes the whole red.
-    serious = Finding(FindingCode.NOT_OBSERVABLE, Severity.SERIOUS, "The poses determine 4 parameters.", "", "Add.")
+    serious = Finding("not-observable", Severity.SERIOUS, "The poses determine 4 parameters.", "", "Add.")
     first, second = found.calibrations
     red = replace(found, calibrations=(first, replace(second, findings=(serious,))))
     document = shared_diagnosis_report(red)

@@ -72,7 +72,7 @@ def main() -> int:
         if r.gyroscope is not None:
             units.append(r.gyroscope_unit.value)
         gravest = max((f.severity.value for f in r.findings), key=RANK.index)
-        codes = sorted({f.code.value for f in r.findings if f.severity.value == gravest != "note"})
+        codes = sorted({f.code for f in r.findings if f.severity.value == gravest != "note"})
         grave = gravest + (f": {', '.join(codes)}" if codes else "")
         counts = f"{r.rows_in_file} = {r.rows_read} + {r.rows_reported}"
         rows.append(f"| {made.maker} | {name} | {counts} | {r.rate_hz:.5g} | {', '.join(units)} | {grave} | {found} |")

@@ -21,7 +21,7 @@ from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
 from trihedron.read.sensing import static_norm
-from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, Recording, SensorCalibration, Severity
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
 from trihedron.sensor_model import correct
@@ -128,7 +128,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     findings = (*recording.findings, *more, *doubted(known), *check_range(known, recording))
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
-        findings = (*findings, Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="calibration"))
+        findings = (*findings, Finding.of("gyroscope-left-out", "one-has-none", which="calibration"))
     if accelerometer is None and gyroscope is None:
         raise InputError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
     force = _corrected(accelerometer, known.accelerometer)
@@ -208,12 +208,12 @@ def doubted(calibration: Calibration) -> tuple[Finding, ...]:
     if not grave:
         return ()
     seen, action = (words("quoted", sentence=sentence) for sentence in (grave[0].seen, grave[0].action))
-    return (Finding.of(FindingCode.CALIBRATION_DOUBTED, seen=seen, action=action),)
+    return (Finding.of("calibration-doubted", seen=seen, action=action),)
 
 
 def _not_applied(effect_id: str, why: str) -> Finding:
     is_of_session = why == words("effect-of-session")
-    return Finding.of(FindingCode.EFFECT_NOT_APPLIED, "of-session" if is_of_session else "", effect=effect_id, why=why)
+    return Finding.of("effect-not-applied", "of-session" if is_of_session else "", effect=effect_id, why=why)
 
 
 # Temperature when a calibration is applied: polynomials are evaluated inside their range, and clamped at its limits.
@@ -240,7 +240,7 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
         raise InputError("the calibration's valid_range is not two temperatures: calibrate again.") from None
     T = recording.temperature_degc
     if T is None or not np.isfinite(T).any():
-        missing = Finding.of(FindingCode.TEMPERATURE_MISSING, low_degc=low, high_degc=high)
+        missing = Finding.of("temperature-missing", low_degc=low, high_degc=high)
         return (missing,) if "thermal" in calibration.extensions else ()
     known = T[np.isfinite(T)]
     outside = int(np.sum((known < low - TOLERANCE_DEGC) | (known > high + TOLERANCE_DEGC)))
@@ -248,7 +248,7 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
         return ()
     return (
         Finding.of(
-            FindingCode.OUTSIDE_VALID_RANGE,
+            "outside-valid-range",
             ends_are_held="thermal" in calibration.extensions,
             n_outside=outside,
             n_samples=len(known),

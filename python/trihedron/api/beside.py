@@ -22,7 +22,7 @@ from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.reference.fit import moves_along
 from trihedron.estimate.reference.gyroscope import poses_at_rest
 from trihedron.read.reference.motion import of_recording
-from trihedron.records import Calibration, Finding, FindingCode, Recording
+from trihedron.records import Calibration, Finding, Recording
 from trihedron.records.reference import AgainstReference
 from trihedron.records.results import DiagnosisResult
 from trihedron.records.words import words
@@ -63,7 +63,7 @@ def beside(
         calibration = (
             calibration_by(found, recording, gravity, source, None) if recording.accelerometer is not None else given
         )
-        why = Finding.of(FindingCode.REFERENCE_ONLY, why=words("because", sentence=error))  # fmt: skip
+        why = Finding.of("reference-only", why=words("because", sentence=error))  # fmt: skip
         return DiagnosisResult(
             **vars(by_reference),
             findings=(*said, *recording.findings, *found.findings, why),
@@ -129,7 +129,7 @@ def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recor
 def _shared(found: AgainstReference) -> Finding:
     offset, sigma = found.clock_offset_s
     return Finding.of(
-        FindingCode.SHARED_MOTION,
+        "shared-motion",
         correlation=found.correlation,
         offset_s=offset,
         offset_std_s=sigma,

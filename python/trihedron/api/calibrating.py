@@ -32,7 +32,7 @@ from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves
 from trihedron.estimate.session.start import GyroClippedError
 from trihedron.estimate.verification import reference_findings
 from trihedron.estimate.verified_static_rate import with_static_rate
-from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
 from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
@@ -164,9 +164,9 @@ def calibrate(
 def _with_doubtful_columns(findings: Found) -> Found:
     """The findings, with columns that were guessed as serious as poses that do not determine a calibration: another
     sensor's readings look like that."""
-    if not any(one.severity is Severity.SERIOUS and one.code is FindingCode.NOT_OBSERVABLE for one in findings):
+    if not any(one.severity is Severity.SERIOUS and one.code == "not-observable" for one in findings):
         return findings
-    is_guess = (FindingCode.COLUMNS_ASSUMED, Severity.WARNING)
+    is_guess = ("columns-assumed", Severity.WARNING)
     return tuple(
         replace(one, severity=Severity.SERIOUS) if (one.code, one.severity) == is_guess else one for one in findings
     )
@@ -191,12 +191,12 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     if gyro is None:
         return fitted
     # The uncertainty without losses, where it is widened by those that are possible.
-    possible = [one.numbers["sigma_scale"] for one in fitted if one.code is FindingCode.LOSSES_POSSIBLE]
+    possible = [one.numbers["sigma_scale"] for one in fitted if one.code == "losses-possible"]
     sigma_scale = min([relative_sigma(gyro.covariance, gyro.S), *possible])
     missing = tuple(missing_samples(recording, segments, sigma_scale))
     of_gyro = scale_findings(gyro.S, sigma_scale, recording)
     # Losses detected in the motion are not also possible ones of the fit.
-    fitted = tuple(one for one in fitted if not (missing and one.code is FindingCode.LOSSES_POSSIBLE))
+    fitted = tuple(one for one in fitted if not (missing and one.code == "losses-possible"))
     return (*fitted, *of_gyro, *missing)
 
 
@@ -259,7 +259,7 @@ def _by_faces(
     if recording.gyroscope is None:
         return alone
     # The lean of the table is found anew beside moves.
-    found = tuple(one for one in found if one.code is not FindingCode.TABLE_TILT)
+    found = tuple(one for one in found if one.code != "table-tilt")
     try:
         stated = None
         if turns_deg is not None:
@@ -313,8 +313,8 @@ def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) ->
 
 def _without_gyroscope(alone: Calibration, error: Exception) -> Calibration:
     if isinstance(error, GyroClippedError):
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "clipped", n_lost=error.n_lost, n_moves=error.n_moves)
+        finding = Finding.of("gyroscope-left-out", "clipped", n_lost=error.n_lost, n_moves=error.n_moves)
     else:
         why = words("because", sentence=str(error))
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=why)
+        finding = Finding.of("gyroscope-left-out", "not-calibrated", why=why)
     return replace(alone, findings=(*alone.findings, finding))

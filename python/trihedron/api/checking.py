@@ -8,7 +8,7 @@ from trihedron.api.calibrating import calibrate
 from trihedron.api.diagnosing_static_log import MOSTLY, TWO_ORIENTATIONS, is_static_log
 from trihedron.api.reading import COUNTS_OF_POSES, FEWEST_POSES, AnyRecording, recording_of, segment
 from trihedron.errors import INPUT_ERRORS
-from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
+from trihedron.records import Finding, Recording, Segments, Severity
 from trihedron.records.noise import least_length_s
 from trihedron.records.progress import Progress
 from trihedron.records.results import CheckResult
@@ -50,9 +50,9 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     duration_s = float(recording.time_s[-1] - recording.time_s[0])
     least_s = least_length_s(recording.rate_hz)
     static = (
-        Finding.of(FindingCode.NOT_FIT, "static-log", duration_s=duration_s)
+        Finding.of("not-fit", "static-log", duration_s=duration_s)
         if duration_s >= least_s
-        else Finding.of(FindingCode.NOT_FIT, "short-static-log", duration_s=duration_s, least_s=least_s)
+        else Finding.of("not-fit", "short-static-log", duration_s=duration_s, least_s=least_s)
     )
     # Standard gravity: only the size of the uncertainties is needed, for which an error of 0.4 % is negligible.
     try:
@@ -64,7 +64,7 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
         return CheckResult(recording, segments, None, (*recording.findings, *_why_not(recording, segments, str(error))))
     if is_static_log(recording, segments, lambda: result.calibration):
         if recording.gyroscope is None and segments.n_poses >= POSES_FOR_NINE:
-            static = Finding.of(FindingCode.NOT_FIT, "same-poses", n_poses=segments.n_poses)
+            static = Finding.of("not-fit", "same-poses", n_poses=segments.n_poses)
         return CheckResult(recording, segments, None, (static, *recording.findings, *segments.findings))
     return CheckResult(recording, segments, result.calibration, result.findings)
 
@@ -77,4 +77,4 @@ def _why_not(recording: Recording, segments: Segments, error: str) -> tuple[Find
             replace(one, severity=Severity.SERIOUS) if one.code in COUNTS_OF_POSES else one for one in segments.findings
         )
     why = words("because", sentence=error.removeprefix(f"{recording.source}: "))
-    return (*segments.findings, Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why))
+    return (*segments.findings, Finding.of("not-fit", "no-calibration", why=why))

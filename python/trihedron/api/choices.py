@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from trihedron.errors import InputError
 from trihedron.gravity import LEAST_M_S2, MOST_M_S2, normal_gravity
-from trihedron.records import Calibration, Finding, FindingCode
+from trihedron.records import Calibration, Finding
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -48,7 +48,7 @@ def _defaulted() -> Finding:
     low, high = normal_gravity(0.0, 3000.0), normal_gravity(90.0)
     wrong = 100.0 * max(STANDARD_GRAVITY_M_S2 - low, high - STANDARD_GRAVITY_M_S2) / STANDARD_GRAVITY_M_S2
     return Finding.of(
-        FindingCode.GRAVITY_DEFAULTED,
+        "gravity-defaulted",
         gravity_m_s2=STANDARD_GRAVITY_M_S2,
         low_m_s2=low,
         high_m_s2=high,

@@ -16,7 +16,7 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.session.starting_point import is_open, starts_nominal
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.gyroscope.common_scale import without_first_scale
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
+from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.records.progress import Progress
 from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
@@ -146,13 +146,13 @@ def _of_poses(
     used, free = _start(calibrated, gravity, known, is_simulation=simulated is not None)
     if known is None:
         # No effect of a sensor stands for a wrong time base: S takes it up.
-        of_scale = tuple(f for f in used.findings if f.code is FindingCode.SCALE_NOT_NOMINAL)
+        of_scale = tuple(f for f in used.findings if f.code == "scale-not-nominal")
         findings = [*without_first_scale(findings, of_scale), *of_scale]
     recording_used, segments_used = recording, segments
     # Where the poses do not determine the model, the session state starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and starts_nominal(used)):
-        findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [
-            Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="model")
+        findings += [f for f in used.findings if f.code == "gyroscope-left-out"] or [
+            Finding.of("gyroscope-left-out", "one-has-none", which="model")
         ]
         recording_used, segments_used = accelerometer_only(recording, segments)
     found = diagnose_recording(

@@ -10,7 +10,7 @@ from trihedron.api.reading import FEWEST_POSES
 from trihedron.diagnose.session.starting_point import is_open, nominal
 from trihedron.diagnose.static_log import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
+from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.records.diagnosis import LinearModel
 from trihedron.records.results import DiagnosisResult
 from trihedron.transforms import directions_of
@@ -96,7 +96,7 @@ def diagnosed_static_log(
     linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
     found = diagnose_static_log(recording, linear, gravity[0], alpha)
     lasts = float(recording.time_s[-1] - recording.time_s[0])
-    few = Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
+    few = Finding.of("not-fit", "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
     return DiagnosisResult(
         **vars(found),
         findings=(*findings, few),

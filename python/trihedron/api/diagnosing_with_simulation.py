@@ -20,7 +20,7 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against.fitted import as_read, model_of_diagnosis
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.verification import verify_calibration
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
+from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
 from trihedron.simulate import Scenario
@@ -60,7 +60,7 @@ def compared_with_model(
     fit = model_of_diagnosis(found)
     place = known.gravity_m_s2, known.gravity_source
     checked = verify_calibration(as_read(known, fit), recording, segments, *place, own)
-    imprecise = tuple(one for one in checked.findings if one.code is FindingCode.CALIBRATION_IMPRECISE)
+    imprecise = tuple(one for one in checked.findings if one.code == "calibration-imprecise")
     if simulated is None:
         return compared(found, known, None, (), recording, checked, alpha), imprecise
     turned = sign_of_gravity((simulated.segments, simulated.calibration), fitted[1:])
@@ -158,9 +158,9 @@ def _both_sensors(
     if (theirs.gyroscope is None) == (recording.gyroscope is None):
         return logged, recording, segments, ()
     if recording.gyroscope is None:
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="recording")
+        finding = Finding.of("gyroscope-left-out", "one-has-none", which="recording")
         return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
-    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "one-has-none", which="simulation")
+    finding = Finding.of("gyroscope-left-out", "one-has-none", which="simulation")
     return logged, *accelerometer_only(recording, segments), (finding,)
 
 

@@ -14,7 +14,7 @@ from trihedron.api.diagnosing import diagnose
 from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import InputError
-from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import not_explained
 from trihedron.records.progress import Progress
@@ -81,11 +81,11 @@ def _spoilt(diagnosis: Diagnosis) -> Finding | None:
     effects = [effect.id for effect in diagnosis.effects]
     gyro, covariance = diagnosis.extended.gyroscope, diagnosis.extended.covariance
     if gyro is not None and covariance is not None and np.diag(covariance)[12:21].max() > np.square(gyro["S"]).max():
-        return Finding.of(FindingCode.EFFECTS_MODELLED, "undetermined", effects=effects, n_effects=len(effects))
+        return Finding.of("effects-modelled", "undetermined", effects=effects, n_effects=len(effects))
     for before, after in diagnosis.predicted:
         if after.rms > MAY_RISE * before.rms:
             return Finding.of(
-                FindingCode.EFFECTS_MODELLED,
+                "effects-modelled",
                 "stays-linear",
                 effects=effects,
                 n_effects=len(effects),
@@ -124,7 +124,7 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
 def _left(base: Calibration, diagnosis: Diagnosis) -> Iterator[Finding]:
     """Findings of the linear calibration that its effects do not answer; the diagnosis has judged g-sensitivity."""
     for one in not_explained(base.findings, diagnosis.remaining):
-        if one.code is not FindingCode.GYRO_G_SENSITIVITY:
+        if one.code != "gyro-g-sensitivity":
             yield one
 
 
@@ -138,7 +138,7 @@ def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:
         # A cosine goes from 1 to -1.
         change = (each.sum(axis=0) * (2.0 if variant == "curve" else 1.0)).tolist()
         yield Finding.of(
-            FindingCode.BIAS_DRIFT,
+            "bias-drift",
             is_gyro=float(effect.id == DRIFTS[1]),
             change=(max(change), unit),
             is_warm=variant == "warm-up",
@@ -164,7 +164,7 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: Float
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
     return Finding.of(
-        FindingCode.EFFECTS_MODELLED,
+        "effects-modelled",
         severity=Severity.WARNING if left else Severity.NOTE,
         effects=[effect.id for effect in diagnosis.effects],
         statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],

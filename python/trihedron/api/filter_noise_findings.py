@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.filter_noise import RANKED_S, SensorFilterNoise, StaticNoise, TiltCheck
 
 CONSISTENT = (1.0, 9.0)
@@ -24,7 +24,7 @@ def too_sure(tilt: TiltCheck | None) -> Iterator[Finding]:
     if tilt is None or tilt.n < FEWEST_MOVES or not tilt.predicted > 0.0 or tilt.actual <= UNCERTAIN * tilt.predicted:
         return
     yield Finding.of(
-        FindingCode.FILTER_NOISE_INCONSISTENT,
+        "filter-noise-inconsistent",
         "tilt",
         actual_rad=tilt.actual,
         times=tilt.actual / tilt.predicted,
@@ -45,7 +45,7 @@ def unlike_this_log(
         if upper > 0.0 and max(N.lower / upper, lower / N.upper) > UNLIKE:
             beside = upper if rest is None else rest.N.value
             yield Finding.of(
-                FindingCode.FILTER_NOISE_OTHER_STATIC,
+                "filter-noise-other-static",
                 sensor=sensor,
                 name=name,
                 static=N.value,
@@ -60,14 +60,12 @@ def noticed(one: SensorFilterNoise) -> Iterator[Finding]:
     """Findings about N, K and their consistency of one sensor."""
     sensor, N, has_static = one.sensor, one.N, one.static is not None
     if not one.is_settled:
-        yield Finding.of(FindingCode.FILTER_NOISE_UNSETTLED, sensor=sensor)
+        yield Finding.of("filter-noise-unsettled", sensor=sensor)
     if N.is_limit:
-        yield Finding.of(
-            FindingCode.FILTER_NOISE_UNCERTAIN, "limit", sensor=sensor, upper=N.upper, has_static=has_static
-        )
+        yield Finding.of("filter-noise-uncertain", "limit", sensor=sensor, upper=N.upper, has_static=has_static)
     elif N.upper > N.lower * UNCERTAIN:
         yield Finding.of(
-            FindingCode.FILTER_NOISE_UNCERTAIN,
+            "filter-noise-uncertain",
             sensor=sensor,
             in_file=N.value,
             lower=N.lower,
@@ -76,7 +74,7 @@ def noticed(one: SensorFilterNoise) -> Iterator[Finding]:
         )
     elif (mostly := _mostly_reference(one)) is not None:
         yield Finding.of(
-            FindingCode.FILTER_NOISE_UNCERTAIN,
+            "filter-noise-uncertain",
             "reference",
             sensor=sensor,
             share=mostly[0],
@@ -84,25 +82,21 @@ def noticed(one: SensorFilterNoise) -> Iterator[Finding]:
             has_static=has_static,
         )
     if one.static is None:
-        yield Finding.of(FindingCode.FILTER_NOISE_NO_STATIC, sensor=sensor)
+        yield Finding.of("filter-noise-no-static", sensor=sensor)
         if N.upper < one.quietest:
             yield Finding.of(
-                FindingCode.FILTER_NOISE_BELOW_QUIETEST, sensor=sensor, in_file=N.filter_value, quietest=one.quietest
+                "filter-noise-below-quietest", sensor=sensor, in_file=N.filter_value, quietest=one.quietest
             )
     if one.reference is not None and one.reference.follows:
-        yield Finding.of(FindingCode.FILTER_NOISE_FOLLOWED, sensor=sensor)
+        yield Finding.of("filter-noise-followed", sensor=sensor)
     if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):
-        yield Finding.of(FindingCode.FILTER_NOISE_NOT_SEPARATED, sensor=sensor)
+        yield Finding.of("filter-noise-not-separated", sensor=sensor)
     if (uncalibrated := _uncalibrated(one)) is not None:
-        yield Finding.of(
-            FindingCode.FILTER_NOISE_UNCALIBRATED, sensor=sensor, share=uncalibrated[0], horizon_s=uncalibrated[1]
-        )
+        yield Finding.of("filter-noise-uncalibrated", sensor=sensor, share=uncalibrated[0], horizon_s=uncalibrated[1])
     tested = [c for c in one.consistency if c.n_apart >= 3]
     worst = next((c for c in tested if not CONSISTENT[0] <= c.nees <= CONSISTENT[1]), None)
     if worst is not None:
-        yield Finding.of(
-            FindingCode.FILTER_NOISE_INCONSISTENT, sensor=sensor, nees=worst.nees, horizon_s=worst.horizon_s
-        )
+        yield Finding.of("filter-noise-inconsistent", sensor=sensor, nees=worst.nees, horizon_s=worst.horizon_s)
 
 
 def _mostly_reference(one: SensorFilterNoise) -> tuple[float, float] | None:

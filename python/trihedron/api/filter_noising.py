@@ -24,7 +24,7 @@ from trihedron.estimate.filter_noise.static_intervals import (
 )
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise, read_noise_findings
-from trihedron.records import Finding, FindingCode, Noise, Recording, Segments, Severity
+from trihedron.records import Finding, Noise, Recording, Segments, Severity
 from trihedron.records.filter_noise import (
     BiasModel,
     Bounded,
@@ -126,7 +126,7 @@ def filter_noise(
         sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
-        findings = (*findings, Finding.of(FindingCode.FILTER_NOISE_STATIC), *too_sure(tilt))
+        findings = (*findings, Finding.of("filter-noise-static"), *too_sure(tilt))
     if static is not None:
         findings = (*findings, *unlike_this_log(known, _sensors(own), sensors, name))
     return FilterNoise(
@@ -247,7 +247,7 @@ def _doubts(static: Noise | str | os.PathLike[str], name: str) -> tuple[Finding,
     said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
     return tuple(
         Finding.of(
-            FindingCode.FILTER_NOISE_STATIC,
+            "filter-noise-static",
             "doubted" if one.severity is Severity.SERIOUS else "noted",
             name=name,
             seen=words("quoted", sentence=one.seen),

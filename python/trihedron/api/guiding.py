@@ -24,7 +24,7 @@ from trihedron.api.verifying import own_calibration, verify
 from trihedron.arrays import XYZ, FloatArray, sigmas_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
-from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
+from trihedron.records import Calibration, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
 from trihedron.records.results import CalibrationResult, VerificationResult
 from trihedron.units import (
@@ -38,7 +38,7 @@ PRIOR = 0.1
 
 SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
 USUAL_POSE_S = 4.0
-_NOT_THE_FIT = (FindingCode.GRAVITY_DEFAULTED, FindingCode.UNIT_CONTRADICTED)
+_NOT_THE_FIT = ("gravity-defaulted", "unit-contradicted")
 POSES_PER_GOAL = 2.5
 """Allowed error of a single pose in multiples of the target accuracy: averaging over a dozen poses does the rest."""
 
@@ -129,7 +129,7 @@ def conclude(
     held_back = part_of(recording, float(last), np.inf)
     segments = segment(held_back)
     # A verification needs few poses, so that the finding about few poses is dropped.
-    kept = tuple(finding for finding in segments.findings if finding.code is not FindingCode.FEW_POSES)
+    kept = tuple(finding for finding in segments.findings if finding.code != "few-poses")
     try:
         return result, verify(result.calibration, held_back, segments=replace(segments, findings=kept))
     except INPUT_ERRORS:
@@ -282,11 +282,11 @@ def _pose_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
 def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
     quiet = {"few-poses", "unit-detected"}
     found = [*recording.findings, *segments.findings]
-    return tuple(f.seen for f in found if f.severity is not Severity.NOTE and f.code.value not in quiet)[:4]
+    return tuple(f.seen for f in found if f.severity is not Severity.NOTE and f.code not in quiet)[:4]
 
 
 def _doubts(calibration: Calibration | None) -> tuple[str, ...]:
     if calibration is None:
         return ()
-    grave = [f for f in calibration.findings if f.severity is Severity.SERIOUS or f.code is FindingCode.OUTLIER_POSE]
+    grave = [f for f in calibration.findings if f.severity is Severity.SERIOUS or f.code == "outlier-pose"]
     return tuple(f.seen for f in grave if f.code not in _NOT_THE_FIT)

@@ -12,14 +12,14 @@ from trihedron.api.asking import asked_in_python
 from trihedron.arrays import AXES
 from trihedron.errors import InputError
 from trihedron.read import ReadError, read_recording
-from trihedron.records import FindingCode, Recording, Segments, Severity
+from trihedron.records import Recording, Segments, Severity
 from trihedron.records.checked import WrongTypeError, number_of
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object
 """A recording, a result with one, or an input of :func:`read`: a file, arrays, a dictionary, a data frame."""
-COUNTS_OF_POSES = (FindingCode.FEW_POSES, FindingCode.NOT_STATIC)
+COUNTS_OF_POSES = ("few-poses", "not-static")
 """Findings that already state the number of poses."""
 FEWEST_POSES = 3
 """Fewest poses with which a fit is tried."""
@@ -288,8 +288,8 @@ def require_poses(recording: Recording, segments: Segments) -> None:
         why = [] if is_count else [f"Poses found: {segments.n_poses}."]
         if grave is not None:
             why += [grave.seen, grave.action] if of_log else [grave.seen]
-            why += [grave.cause] if grave.code is FindingCode.NOT_STATIC else []
-        if grave is None or grave.code is not FindingCode.RATE_CONTRADICTED:
+            why += [grave.cause] if grave.code == "not-static" else []
+        if grave is None or grave.code != "rate-contradicted":
             why.append("Hold the sensor still for 3 to 5 seconds in each of 18 or more different poses;")
             why.append("`trihedron segment LOG` shows what was seen.")
         raise InputError(f"{recording.source}: {' '.join(why)}")

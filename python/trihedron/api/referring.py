@@ -18,7 +18,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.reference import fit_reference, turns_of_frame
 from trihedron.read import ReadError
 from trihedron.read.reference.motion import of_recording, read_reference
-from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration
+from trihedron.records import Calibration, Finding, Frame, Recording, SensorCalibration
 from trihedron.records.diagnosis import (
     AcceptedEffect,
     Candidate,
@@ -55,7 +55,7 @@ def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceM
             log = read(reference)
         except ReadError:
             return read_reference(reference)
-        is_named = not any(f.code is FindingCode.COLUMNS_ASSUMED for f in log.findings)
+        is_named = not any(f.code == "columns-assumed" for f in log.findings)
         if is_named and log.accelerometer is not None and log.gyroscope is not None:
             return replace(of_recording(log), findings=())
     return read_reference(reference, columns)
@@ -80,7 +80,7 @@ def held_against(
     known = None if given is None or given.gyroscope is None else (given.gyroscope.S, given.gyroscope.b)
     found = fit_reference(recording, motion, gravity, given=known)
     if is_own or (motion.sha256 and motion.sha256 == recording.sha256):
-        found = replace(found, findings=(*found.findings, Finding.of(FindingCode.REFERENCE_OF_ITSELF)))
+        found = replace(found, findings=(*found.findings, Finding.of("reference-of-itself")))
     return found
 
 
@@ -155,7 +155,7 @@ def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, F
     if scale is None:
         scale = gravity / float(np.nanmedian(np.linalg.norm(raw, axis=1)))
     covariance = np.diag([*np.full(9, (NOMINAL_SCALE * scale) ** 2), *np.full(3, NOMINAL_BIAS_M_S2**2)])
-    finding = Finding.of(FindingCode.ACCELEROMETER_NOMINAL, scale=scale)
+    finding = Finding.of("accelerometer-nominal", scale=scale)
     unit = recording.accelerometer_unit.value
     return SensorCalibration(scale * np.eye(3), np.zeros(3), covariance, unit, "m/s^2", "nominal"), finding
 

@@ -18,7 +18,7 @@ from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among, of_another_unit
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
-from trihedron.records import Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
+from trihedron.records import Finding, Frame, Recording, SensorCalibration, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.results import CalibrationResult, SessionsResult
@@ -29,10 +29,10 @@ from trihedron.session.noise import bias_drift
 
 BYS: tuple[By, ...] = get_args(By)
 LEFT_BY_S_AND_B = (
-    FindingCode.RESIDUAL_ABOVE_NOISE,
-    FindingCode.HELD_OUT_WORSE,
-    FindingCode.GYRO_G_SENSITIVITY,
-    FindingCode.GYRO_BIAS_DRIFT,
+    "residual-above-noise",
+    "held-out-worse",
+    "gyro-g-sensitivity",
+    "gyro-bias-drift",
 )
 HEATING_DEGC = 1.0
 """Change of temperature over a recording from which it counts as heating or cooling: built-in thermometers have a
@@ -121,7 +121,7 @@ def calibrate_sessions(
         raise InputError(f"two recordings at least are needed to see what repeats ({reasons}).")
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
-    of_place = (one for one in results[0].findings if one.code is FindingCode.GRAVITY_DEFAULTED)
+    of_place = (one for one in results[0].findings if one.code == "gravity-defaulted")
     findings = (*of_place, *_doubts(results, sessions), *model.findings)
     if by != "device":
         findings = (*several_devices(sessions, model.changes, "calibrated"), *findings)
@@ -131,25 +131,25 @@ def calibrate_sessions(
 
 def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -> Iterator[Finding]:
     """Clipping of every recording, and its gravest warning about what S and b leave: the common ones leave it too."""
-    doubted: dict[FindingCode, list[tuple[str, str, str]]] = {}
+    doubted: dict[str, list[tuple[str, str, str]]] = {}
     for result, session in zip(results, sessions, strict=True):
         warned = {f.code: f.seen for f in result.findings if f.severity is Severity.WARNING}
         gravest = [code for code in LEFT_BY_S_AND_B if code in warned][:1]
-        for code in (*gravest, *(code for code in warned if code is FindingCode.CLIPPING)):
+        for code in (*gravest, *(code for code in warned if code == "clipping")):
             one = session.name, warned[code], as_arguments(result.recording.source)
             doubted.setdefault(code, []).append(one)
-    stated = {FindingCode.CLIPPING, *doubted}
+    stated = {"clipping", *doubted}
     also = [
-        (session.name, list(dict.fromkeys(f.code.value for f in result.findings if _is_other(f, stated))))
+        (session.name, list(dict.fromkeys(f.code for f in result.findings if _is_other(f, stated))))
         for result, session in zip(results, sessions, strict=True)
     ]
     if any(codes for _, codes in also):
-        yield Finding.of(FindingCode.CALIBRATION_DOUBTED, "others", recordings=[one for one in also if one[1]])
+        yield Finding.of("calibration-doubted", "others", recordings=[one for one in also if one[1]])
     for code, said in doubted.items():
         name, warning, path = said[0]
         seen = words("quoted", sentence=warning)
         yield Finding.of(
-            FindingCode.CLIPPING if code is FindingCode.CLIPPING else FindingCode.CALIBRATION_DOUBTED,
+            "clipping" if code == "clipping" else "calibration-doubted",
             "of-recordings",
             n=len(said),
             n_all=len(results),
@@ -159,8 +159,8 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
         )
 
 
-def _is_other(finding: Finding, stated: set[FindingCode]) -> bool:
-    return finding.severity is Severity.WARNING and finding.code not in {*stated, FindingCode.GRAVITY_DEFAULTED}
+def _is_other(finding: Finding, stated: set[str]) -> bool:
+    return finding.severity is Severity.WARNING and finding.code not in {*stated, "gravity-defaulted"}
 
 
 def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:
@@ -197,7 +197,7 @@ def several_devices(
 ) -> tuple[Finding, ...]:
     """A finding for every change that one unit does not make."""
     return tuple(
-        Finding.of(FindingCode.SEVERAL_DEVICES, case, parameter=one.id, amount=amount_of(one))
+        Finding.of("several-devices", case, parameter=one.id, amount=amount_of(one))
         for one in of_another_unit(sessions, changes)
     )
 

@@ -16,7 +16,7 @@ from trihedron.estimate.sessions.changes import changes_among
 from trihedron.estimate.sessions.spread import next_session, repeated_parameters, spread_of_next
 from trihedron.estimate.sessions.thermal import thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector
-from trihedron.records import Calibration, Finding, FindingCode, Frame, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, Frame, SensorCalibration, Severity
 from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.sessions import PARAMETERS, By, Change, Repeated, Session, SessionsModel, ThermalModel
 from trihedron.records.words import Words, words
@@ -162,18 +162,18 @@ def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
     used = [session.name for session in model.sessions]
     names = distinct_names([*used, *(path for path, _ in model.left_out)])[len(used) :]
     out = [
-        Finding.of(FindingCode.SESSION_LEFT_OUT, name=name, why=words("because", sentence=why), path=as_arguments(path))
+        Finding.of("session-left-out", name=name, why=words("because", sentence=why), path=as_arguments(path))
         for name, (path, why) in zip(names, model.left_out, strict=True)
     ]
     n = len({session.group for session in model.sessions}) if model.by in ("date", "device") else len(model.sessions)
     if n < FEW and model.thermal is None:
         what = {"date": "days", "device": "devices"}.get(model.by, "recordings")
-        out.append(Finding.of(FindingCode.FEW_SESSIONS, n_groups=n, kind=what, wanted=FEW))
+        out.append(Finding.of("few-sessions", n_groups=n, kind=what, wanted=FEW))
     out += [_changed(change, model) for change in model.changes if change.significant]
     temperatures = [s.temperature_degc for s in model.sessions if math.isfinite(s.temperature_degc)]
     if model.thermal is None and len(temperatures) > 1 and np.ptp(temperatures) > WIDE_RANGE_DEGC:
         low, high = min(temperatures), max(temperatures)
-        out.append(Finding.of(FindingCode.TEMPERATURE_DRIVEN, low_degc=low, high_degc=high, span_degc=high - low))
+        out.append(Finding.of("temperature-driven", low_degc=low, high_degc=high, span_degc=high - low))
     return tuple(out)
 
 
@@ -182,7 +182,7 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
     is_other = kind == change.id and max(map(abs, change.size)) > OTHER_UNIT
     case = f"{kind}-{change.kind}"
     return Finding.of(
-        FindingCode.PARAMETERS_CHANGED,
+        "parameters-changed",
         case,
         severity=Severity.SERIOUS if is_other else Severity.WARNING,
         is_other=is_other,

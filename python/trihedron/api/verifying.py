@@ -27,7 +27,7 @@ from trihedron.estimate.ranking import densities, rms_interval, suspicions_of, w
 from trihedron.estimate.verification import verify_calibration
 from trihedron.files.formats import any_calibration
 from trihedron.files.formats.boards import as_logged
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity, Verification
+from trihedron.records import Calibration, Finding, Recording, Segments, Severity, Verification
 from trihedron.records.progress import Progress
 from trihedron.records.ranking import Ranked, Ranking
 from trihedron.records.results import VerificationResult
@@ -83,7 +83,7 @@ def verify(
     True
     """
     known = calibration_of(calibration)
-    changed = [one for one in known.findings if one.code is FindingCode.BIAS_DRIFT]
+    changed = [one for one in known.findings if one.code == "bias-drift"]
     recording = recording_of(recording, latitude_deg)
     check_units(known, recording)
     linear, more = without_effects(known, recording)
@@ -94,9 +94,9 @@ def verify(
     judged = verify_calibration(_with_drifts(known, changed), recording, segments, gravity, source, own)
     is_tilt_limited = limit_deg is not None
     accepted = {
-        FindingCode.RESIDUAL_ABOVE_NOISE: limit_mg is not None,
-        FindingCode.HELD_OUT_WORSE: is_tilt_limited,
-        FindingCode.STATIC_RATE_ABOVE_NOISE: is_tilt_limited,
+        "residual-above-noise": limit_mg is not None,
+        "held-out-worse": is_tilt_limited,
+        "static-rate-above-noise": is_tilt_limited,
     }
     missed = tuple(
         replace(found, severity=Severity.WARNING) if accepted.get(found.code, False) else found
@@ -142,16 +142,12 @@ def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | Non
     if limit_mg is not None and not mg_from_m_s2(rms_m_s2) <= limit_mg:
         is_below = mg_from_m_s2(rms_of(judged.norm_noise)) > limit_mg
         found.append(
-            Finding.of(
-                FindingCode.LIMIT_EXCEEDED, "static", rms_m_s2=rms_m_s2, limit_mg=limit_mg, is_below_noise=is_below
-            )
+            Finding.of("limit-exceeded", "static", rms_m_s2=rms_m_s2, limit_mg=limit_mg, is_below_noise=is_below)
         )
     if limit_deg is not None and not rms_deg <= limit_deg:
         is_below = rms_of(judged.angle_noise_deg) > limit_deg
         found.append(
-            Finding.of(
-                FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=rms_deg, limit_deg=limit_deg, is_below_noise=is_below
-            )
+            Finding.of("limit-exceeded", "moves", rms_deg=rms_deg, limit_deg=limit_deg, is_below_noise=is_below)
         )
     return tuple(found)
 
@@ -164,7 +160,7 @@ def same_recording(known: Calibration, recording: Recording) -> tuple[Finding, .
     # One of the two files of a recording has a hash of its own.
     groups = [known.recording_source, *(one.get("group", "") for one in sessions)]
     is_half = any(" + " in group and recording.source in group.split(" + ") for group in groups)
-    return (Finding.of(FindingCode.SAME_RECORDING),) if is_same or is_half else ()
+    return (Finding.of("same-recording"),) if is_same or is_half else ()
 
 
 def rank(

@@ -40,19 +40,19 @@ def apply(
     note_file(calibration)
     recording = source.read()
     from trihedron.api import applying
-    from trihedron.records import FindingCode, Severity
+    from trihedron.records import Severity
     from trihedron.report.findings import likely
     from trihedron.report.machine import recording_record
 
     done = applying.apply(known, recording)
     write_recording(done, output, overwrite=force)
     if str(output) != "-":
-        is_even = any(finding.code is FindingCode.EVEN_CLOCK for finding in recording.findings)
+        is_even = any(finding.code == "even-clock" for finding in recording.findings)
         clock = f", timestamps of an even clock of {done.rate_hz:.6g} Hz" if is_even else ""
         say(f"{done.n_samples} samples{clock}: {output}")
     for one in done.findings:
         # No calibration restores what a range limit cut off; other findings on the log are those of reading it.
-        is_told = one not in recording.findings or one.code is FindingCode.CLIPPING
+        is_told = one not in recording.findings or one.code == "clipping"
         if is_told and one.severity is not Severity.SERIOUS:
             seen = one.seen if one.severity is Severity.NOTE else f"{one.severity.value}: {one.seen}"
             say(with_commands(" ".join(filter(None, (seen, likely(one.cause), one.action and f"→ {one.action}")))))

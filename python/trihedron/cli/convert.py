@@ -19,7 +19,7 @@ def convert(source: LogSource, output: Path, json: Path | None = None, force: bo
 
     reading.convert(recording, output, overwrite=force)
     for finding in recording.findings:
-        if finding.severity.value != "note" or finding.code.value in {"rows-left-out", "device-chosen"}:
+        if finding.severity.value != "note" or finding.code in {"rows-left-out", "device-chosen"}:
             say(str(finding))
     rows = (
         f"{recording.rows_in_file} rows in the file = {recording.rows_read} read + {recording.rows_reported} reported"

@@ -134,12 +134,11 @@ def with_arguments(document: Document, stored_by: str = "...") -> Document:
     """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next,
     and in the actions of findings, replaced by those of this run; where nothing was stored, ``stored_by`` is the
     command that does."""
-    from trihedron.records import FindingCode
 
     said, what_next = document.next_step, document.what_next
-    if any(one.code is FindingCode.GRAVITY_DEFAULTED for one in document.findings):
+    if any(one.code == "gravity-defaulted" for one in document.findings):
         _now().place = UNKNOWN_PLACE
-    if any(one.code is FindingCode.RATE_ASSUMED for one in document.findings) and UNKNOWN_RATE not in _now().log:
+    if any(one.code == "rate-assumed" for one in document.findings) and UNKNOWN_RATE not in _now().log:
         _now().log += UNKNOWN_RATE
     if not _now().file:
         what_next = what_next.replace("-o FILE --force", "-o FILE")

@@ -33,7 +33,6 @@ from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, Verdict
 from trihedron.records.domains import Domain, DomainTest, Where
-from trihedron.records.finding import FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
@@ -172,7 +171,7 @@ def _on_support(predicted: Fit, start: SessionState, alpha: float) -> tuple[Fit,
     """The fit, with the motion of a support that yields (eq. 8.7f); and the domains in which a bias settles inside the
     poses, with p-values: the noise of their means had absorbed it."""
     obs, state = predicted.obs, predicted.state
-    biases = [one for one in obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
+    biases = [one for one in obs.segments.findings if one.code == "bias-settling"]
     shown: dict[Domain, float] = {"within-static": biases[0].numbers["p_value"]} if biases else {}
     support = obs.support_seen(state)
     if support is not None and support.of_bias >= threshold(alpha):

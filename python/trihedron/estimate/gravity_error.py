@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.quantiles import MAD_TO_SIGMA, median
-from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
+from trihedron.records import Calibration, Finding, SensorCalibration
 from trihedron.sensor_model import correct, norms, other_form
 
 FAR_FROM_GRAVITY = 0.2
@@ -54,7 +54,7 @@ def static_force(calibration: Calibration, norm_m_s2: float, force: FloatArray, 
     elif abs(share) > OFF_GRAVITY and abs(norm_m_s2 - gravity) > SIGMAS * sigma:
         case = "off"
     return Finding.of(
-        FindingCode.STATIC_FORCE,
+        "static-force",
         case,
         norm_m_s2=norm_m_s2,
         gravity_m_s2=gravity,

@@ -25,7 +25,6 @@ from trihedron.gravity import earth_rate_up
 from trihedron.records import (
     Calibration,
     Finding,
-    FindingCode,
     Recording,
     Segments,
     SensorCalibration,
@@ -121,7 +120,7 @@ def _untested(calibration: Calibration, own: Calibration | None, segments: Segme
     sensors = [name for name, _ in calibration.sensors if name not in determined]
     if sensors:
         poses, moves = segments.n_poses, len(segments.moves)
-        yield Finding.of(FindingCode.NOT_TESTED, sensors=sensors, poses=poses, moves=moves)
+        yield Finding.of("not-tested", sensors=sensors, poses=poses, moves=moves)
 
 
 class _Changed(NamedTuple):
@@ -163,7 +162,7 @@ def _worse_than_none(
         pairs["moves"] = (angle, _carried(with_it, gyroscope, measured, segments).angle_deg)
     return [
         Finding.of(
-            FindingCode.WORSE_THAN_UNCALIBRATED,
+            "worse-than-uncalibrated",
             f"verify-{case}",
             rms=rms_of(with_it),
             rms_without=rms_of(bare),
@@ -187,7 +186,7 @@ def reference_findings(calibration: Calibration, recording: Recording, segments:
     bare, _, _ = norm_error(without.accelerometer, means, noise, gravity)
     if rms_of(error) >= rms_of(bare):
         yield Finding.of(
-            FindingCode.WORSE_THAN_UNCALIBRATED,
+            "worse-than-uncalibrated",
             "reference",
             rms_m_s2=rms_of(error),
             rms_without_m_s2=rms_of(bare),
@@ -244,7 +243,7 @@ def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, ch
     worst = int(np.argmax(np.abs(error / sigma)))
     n_same, mean = int(max(np.sum(error > 0.0), np.sum(error < 0.0))), float(np.mean(error))
     yield Finding.of(
-        FindingCode.RESIDUAL_ABOVE_NOISE,
+        "residual-above-noise",
         "verify-static",
         norm_rms_m_s2=rms_of(error),
         is_bias=changed.is_bias,
@@ -296,7 +295,7 @@ def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> I
     move = segments.moves[moves.which[worst]]
     unsteady = [k + 1 for k in (move.pose_before, move.pose_after) if segments.poses[k].is_unsteady]
     yield Finding.of(
-        FindingCode.HELD_OUT_WORSE,
+        "held-out-worse",
         "verify-moves",
         angle_rms_deg=rms_of(angle_deg),
         is_bias=changed.is_bias,

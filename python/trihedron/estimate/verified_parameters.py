@@ -8,7 +8,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray, rms_of
 from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import RELATIVE
 from trihedron.records.sessions import PARAMETERS
 from trihedron.records.verification import JudgedParameter
@@ -104,7 +104,7 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> Iterator[Finding]
     amounts = [(-one.difference, one.sigma, one.unit) for one in shifted]
     named = [(f"{one.id}-{one.name}", amount, one.name) for one, amount in zip(shifted, amounts, strict=True)]
     yield Finding.of(
-        FindingCode.CALIBRATION_SHIFT,
+        "calibration-shift",
         "" if others else "gyro-bias-alone",
         parameters=named[:LISTED],
         first=named[0][0],
@@ -177,4 +177,4 @@ def imprecision_findings(error: FloatArray, angle_deg: FloatArray, own: Calibrat
             times = rms_of(errors) / rms_of(held)
             p = probability.fdtrc(n_components * len(errors), n_components * len(held), times**2)
             if p < probability.FALSE_ALARM:
-                yield Finding.of(FindingCode.CALIBRATION_IMPRECISE, case, times=times, p=p)
+                yield Finding.of("calibration-imprecise", case, times=times, p=p)

@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import AXES, FloatArray, rms_of
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity
 from trihedron.session.drift import TYPICAL
 from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF, expected_scatter
 
@@ -53,9 +53,9 @@ def expected_change(known: Calibration, recording: Recording, segments: Segments
 
 def _stated_change(known: Calibration) -> float:
     """How far the gyro's bias changed in the recording of the calibration [rad/s], on the worst axis."""
-    changes = [one.numbers["change_rad_s"] for one in known.findings if one.code is FindingCode.GYRO_BIAS_DRIFT]
+    changes = [one.numbers["change_rad_s"] for one in known.findings if one.code == "gyro-bias-drift"]
     for one in known.findings:
-        if one.code is FindingCode.BIAS_DRIFT and one.numbers["is_gyro"]:
+        if one.code == "bias-drift" and one.numbers["is_gyro"]:
             changes += [one.numbers[f"change_{axis}"] for axis in AXES]
     return max(changes, default=0.0)
 
@@ -74,7 +74,7 @@ def bias_findings(
     shift = rms_of(np.mean(rest, axis=0))
     if shift > far * sigma:
         yield Finding.of(
-            FindingCode.CALIBRATION_SHIFT,
+            "calibration-shift",
             "gyro-bias",
             rate_rad_s=shift,
             times_expected=shift / sigma,
@@ -92,10 +92,10 @@ def rate_findings(rest: FloatArray, sigma: FloatArray, own: Calibration | None, 
     chi2_per_dof = float(np.sum((away / sigma) ** 2)) / dof
     if probability.fdtrc(dof, NOISE_DOF, chi2_per_dof) > probability.FALSE_ALARM:
         return
-    seen = [] if own is None else [f for f in own.findings if f.code is FindingCode.GYRO_G_SENSITIVITY]
+    seen = [] if own is None else [f for f in own.findings if f.code == "gyro-g-sensitivity"]
     pose, axis = np.unravel_index(int(np.argmax(np.abs(away))), away.shape)
     yield Finding.of(
-        FindingCode.STATIC_RATE_ABOVE_NOISE,
+        "static-rate-above-noise",
         severity=Severity.SERIOUS if chi2_per_dof > far**2 else Severity.WARNING,
         rate_rms_rad_s=rms_of(away),
         times=np.sqrt(chi2_per_dof),

@@ -70,15 +70,15 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
                 {"id": effect.id, "share": effect.share, "statement": effect.statement} for effect in found.effects
             ],
         }
-        findings = {f.code.value: f for f in (*found.findings, *result.findings)}.values()
+        findings = {f.code: f for f in (*found.findings, *result.findings)}.values()
     else:
         result = calibrating.calibrate(recording, **place)
-        findings = {f.code.value: f for f in result.findings}.values()
+        findings = {f.code: f for f in result.findings}.values()
     return _row(result) | {
         "diagnosis": diagnosis,
-        "warnings": sorted(f.code.value for f in findings if f.severity.value == "warning"),
-        "serious": sorted(f.code.value for f in findings if f.severity.value == "serious"),
-        "reread": " ".join(f.action for f in findings if f.severity.value == "serious" and f.code.value in MISREAD),
+        "warnings": sorted(f.code for f in findings if f.severity.value == "warning"),
+        "serious": sorted(f.code for f in findings if f.severity.value == "serious"),
+        "reread": " ".join(f.action for f in findings if f.severity.value == "serious" and f.code in MISREAD),
     }
 
 

@@ -12,7 +12,7 @@ from trihedron.read.clock.unit import TICKS
 from trihedron.read.errors import ReadError
 from trihedron.read.names import ColumnName, parse_name
 from trihedron.read.table import Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 Sensor = Literal["accelerometer", "gyroscope"]
 Triad = tuple[int, int, int]
@@ -188,7 +188,7 @@ def _by_place(table: Table, known: Meanings, sensor: Sensor | None, findings: li
         )
     kinds = SENSORS if n >= 2 * len("xyz") else (sensor or "accelerometer",)
     if len(kinds) == 1 and sensor is None:
-        findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=n, is_named=False))
+        findings.append(Finding.of("columns-assumed", "accelerometer", n_columns=n, is_named=False))
     roles = [*[("time", "")] * (n % 3), *((kind, axis) for kind in kinds for axis in "xyz")]
     return {i: ColumnName(*role, _PLACE, rank=_OWN_CLOCK) for i, role in zip(filled, roles, strict=True)}
 
@@ -201,7 +201,7 @@ def _bare(table: Table, meanings: Meanings, sensor: Sensor | None, findings: lis
     by_unit = [one for one in SENSORS if meanings[bare[0][0]].unit_for(one)]
     told = sensor or sensor_of_file_name(table.path.name) or (by_unit[0] if len(by_unit) == 1 else None)
     if told is None:
-        findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=3, is_named=True))
+        findings.append(Finding.of("columns-assumed", "accelerometer", n_columns=3, is_named=True))
     kind = told or "accelerometer"
     return {i: replace(meanings[i], role=kind, unit=meanings[i].unit_for(kind)) for i in bare[0]}
 
@@ -303,7 +303,7 @@ def _rivals(table: Table, chosen: Columns, triads: dict[Sensor, list[Triad]]) ->
             other: dict[str, Any] = {sensor: found[1]}
             mapping = replace(chosen, **other).mapping()
             yield Finding.of(
-                FindingCode.COLUMNS_ASSUMED,
+                "columns-assumed",
                 "one-of-several",
                 sensor=sensor,
                 taken=taken,
@@ -318,9 +318,9 @@ def _columns_of_words(table: Table, columns: Columns) -> Iterator[Finding]:
         label, cell = table.label(column), example[:40]
         sensor = parse_name(table.names[column]).role if table.names else ""
         if sensor in SENSORS and getattr(columns, sensor) is None:
-            yield Finding.of(FindingCode.COLUMN_LEFT_OUT, "axis", column=label, example=cell, sensor=sensor)
+            yield Finding.of("column-left-out", "axis", column=label, example=cell, sensor=sensor)
         else:
-            yield Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=label, example=cell)
+            yield Finding.of("column-left-out", "words", column=label, example=cell)
 
 
 def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
@@ -334,7 +334,7 @@ def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
     used = {*columns.used(), columns.counter}
     rest = [table.label(c) for c in range(len(table.columns)) if c not in used and len(table.columns[c])]
     return Finding.of(
-        FindingCode.COLUMNS_RECOGNISED,
+        "columns-recognised",
         has_file=bool(file_name),
         file=file_name,
         roles=roles,

@@ -12,7 +12,7 @@ from trihedron.read.columns import SENSORS, Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name, sensor_said
 from trihedron.read.table import Options, Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.words import Words
 from trihedron.records.words import words as phrase
 
@@ -109,7 +109,7 @@ def one_device(table: Table, options: Options, chosen_columns: Columns) -> Table
     if found is None and readings and (n := n_interleaved(np.stack(readings, axis=1))) > 1:
         found = _device_column(table, others, lambda codes: bool(np.mean(np.diff(codes[order]) != 0) > 0.5))
         if found is None and options.instance is None:
-            return replace(table, findings=(*table.findings, Finding.of(FindingCode.DEVICES_INTERLEAVED, n=n)))
+            return replace(table, findings=(*table.findings, Finding.of("devices-interleaved", n=n)))
         if found is None:
             return _by_turn(table, options.instance or "", n, time)
     if found is None and time is not None and (back := _steps_back(table, time)) is not None:
@@ -145,7 +145,7 @@ def one_device(table: Table, options: Options, chosen_columns: Columns) -> Table
 def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Finding:
     """The finding that one of several devices is read."""
     return Finding.of(
-        FindingCode.DEVICE_CHOSEN,
+        "device-chosen",
         where=where,
         listed=listed,
         chosen=what,

@@ -6,7 +6,7 @@ from trihedron.arrays import BoolArray, IntArray
 from trihedron.read.columns import Sensor, Triad, find_columns
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 _LOOKED_AT = 1000
 _USUALLY_BOTH = 0.9
@@ -43,7 +43,7 @@ def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[T
         )
     left = int(np.count_nonzero(~(acc | gyr)))
     note = Finding.of(
-        FindingCode.DEVICE_CHOSEN,
+        "device-chosen",
         "in-turn",
         accelerometer_rows=len(rows[0]),
         gyroscope_rows=len(rows[1]),

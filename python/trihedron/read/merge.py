@@ -11,7 +11,7 @@ from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.errors import ReadError
 from trihedron.read.sensing import WHOLE
 from trihedron.read.sensors import Sensors, settled
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 
 SAME_TICK = 0.02
 """Timestamps closer than this fraction of a step are equal: the reading is used without interpolation."""
@@ -84,7 +84,7 @@ def _on_clock_of(base: Sensors, other: Sensors, where: str) -> tuple[Sensors, Fi
     ((own, kept_v),), ((name, other_v),) = base.triads.items(), other.triads.items()
     if np.array_equal(base_t, other_t):
         others: dict[str, Any] = other.triads
-        return replace(base, **others), Finding.of(FindingCode.CLOCKS_MERGED, "same-timestamps")
+        return replace(base, **others), Finding.of("clocks-merged", "same-timestamps")
     rate = {own: mean_rate_hz(base_t), name: mean_rate_hz(other_t)}
     start = {own: base_t[0], name: other_t[0]}
     step = 1.0 / rate[name]
@@ -101,7 +101,7 @@ def _on_clock_of(base: Sensors, other: Sensors, where: str) -> tuple[Sensors, Fi
     n_cut = len(base_t) - len(kept_t)
     n_beyond = int(np.count_nonzero((other_t < kept_t[0] - step) | (other_t > kept_t[-1] + step)))
     note = Finding.of(
-        FindingCode.CLOCKS_MERGED,
+        "clocks-merged",
         severity=Severity.WARNING if own == "gyroscope" or variance < QUIETER else Severity.NOTE,
         accelerometer_rate_hz=rate["accelerometer"],
         gyroscope_rate_hz=rate["gyroscope"],

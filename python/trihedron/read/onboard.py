@@ -3,7 +3,7 @@
 import re
 from types import MappingProxyType
 
-from trihedron.records import Finding, FindingCode, Onboard, Severity
+from trihedron.records import Finding, Onboard, Severity
 from trihedron.records.onboard import Autopilot, Stage
 
 
@@ -38,7 +38,7 @@ def said_of(onboard: Onboard | None) -> tuple[Finding, ...]:
         return ()
     return (
         Finding.of(
-            FindingCode.CORRECTED_ON_BOARD,
+            "corrected-on-board",
             severity=Severity.WARNING if onboard.changed else Severity.NOTE,
             autopilot={"ardupilot": "ArduPilot", "px4": "PX4"}[onboard.autopilot],
             accel=onboard.accel + 1,

@@ -33,11 +33,11 @@ from trihedron.read.source import read_tables
 from trihedron.read.table import Options
 from trihedron.read.temperature import temperature_of
 from trihedron.read.turning import turning_of
-from trihedron.records import Finding, FindingCode, Recording
+from trihedron.records import Finding, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
-ONE_SETTING = (FindingCode.UNIT_CONTRADICTED, FindingCode.AXES_CHANGED)
+ONE_SETTING = ("unit-contradicted", "axes-changed")
 """Findings about the units and axes of a sensor whose settings do not change."""
 TIMESTAMPS = "logged time after the first [s]"
 """Auxiliary column with the logged timestamps, where an even clock replaces them."""
@@ -111,7 +111,7 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
     if missing:
         findings.append(
             Finding.of(
-                FindingCode.ROWS_UNACCOUNTED,
+                "rows-unaccounted",
                 in_file=sensors.rows_in_file,
                 read=sensors.rows_read,
                 reported=reported,
@@ -228,7 +228,7 @@ def _exchanged(sensors: Sensors, rate_hz: float) -> list[Finding]:
     columns = sensors.columns
     swapped = replace(columns, accelerometer=columns.gyroscope, gyroscope=columns.accelerometer)
     mapping = "" if columns.gyroscope is None else swapped.mapping()
-    return [Finding.of(FindingCode.SENSORS_EXCHANGED, is_one_file=bool(mapping), mapping=mapping)]
+    return [Finding.of("sensors-exchanged", is_one_file=bool(mapping), mapping=mapping)]
 
 
 def _finite_extremes(triad: FloatArray) -> Extremes:
@@ -295,7 +295,7 @@ def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
             if _turns_with(accelerometer, rates, rate_hz):
                 listed = " ".join(table.label(column) for column in (x, y, z))
                 mapping = replace(columns, gyroscope=(x, y, z)).mapping()
-                found.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "unnamed-gyro", taken=listed, mapping=mapping))
+                found.append(Finding.of("columns-assumed", "unnamed-gyro", taken=listed, mapping=mapping))
     return tuple(found)
 
 

@@ -13,7 +13,7 @@ from trihedron.channel_facts.quiet import Windows, is_integer, look
 from trihedron.read.errors import ReadError
 from trihedron.read.names import known_unit
 from trihedron.read.turning import Turning
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 
 NEAR_GRAVITY = 0.2
@@ -74,7 +74,7 @@ def judge_accelerometer(
         if not (gravities < 0.6 or gravities > 1.5):
             return Judged(stated, (_statement("accelerometer", stated, given),))
         against = Finding.of(
-            FindingCode.UNIT_CONTRADICTED,
+            "unit-contradicted",
             "accelerometer",
             unit=stated.value,
             has_fitting=fitting is not None,
@@ -88,7 +88,7 @@ def judge_accelerometer(
     unit = AccelerationUnit.COUNTS
     is_whole = is_integer(readings) or named == WHOLE
     if is_whole and fitting is not AccelerationUnit.G:
-        found = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-counts", static_norm=norm)
+        found = Finding.of("unit-detected", "accelerometer-counts", static_norm=norm)
         if _is_near(norm, 1000.0):
             found = _alike(unit, norm, is_whole=True)
     elif fitting is not None:
@@ -98,17 +98,17 @@ def judge_accelerometer(
         if is_alike:
             found = _alike(unit, norm, is_whole=False)
         else:
-            found = Finding.of(FindingCode.UNIT_DETECTED, "accelerometer-static", static_norm=norm, unit=unit.value)
+            found = Finding.of("unit-detected", "accelerometer-static", static_norm=norm, unit=unit.value)
     elif norm < 1.0 and not is_whole:
         unit = AccelerationUnit.M_S2
-        found = Finding.of(FindingCode.GRAVITY_MISSING, static_norm=norm)
+        found = Finding.of("gravity-missing", static_norm=norm)
     else:
-        found = Finding.of(FindingCode.UNIT_ASSUMED, "no-gravity", is_seen=not math.isnan(norm), static_norm=norm)
+        found = Finding.of("unit-assumed", "no-gravity", is_seen=not math.isnan(norm), static_norm=norm)
     return Judged(unit, (found,))
 
 
 def _alike(unit: AccelerationUnit, norm: float, *, is_whole: bool) -> Finding:
-    return Finding.of(FindingCode.UNIT_ASSUMED, "alike", static_norm=norm, unit=unit.value, is_whole=is_whole)
+    return Finding.of("unit-assumed", "alike", static_norm=norm, unit=unit.value, is_whole=is_whole)
 
 
 _GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si := acceleration_to_si(unit))}
@@ -133,7 +133,7 @@ def _stated(kind: type[Unit], named: str, given: str | Unit | None) -> Unit | No
 
 def _statement(sensor: str, unit: AccelerationUnit | RateUnit, given: object) -> Finding:
     is_given = given is not None
-    return Finding.of(FindingCode.UNIT_DETECTED, "stated", sensor=sensor, unit=unit.value, is_given=is_given)
+    return Finding.of("unit-detected", "stated", sensor=sensor, unit=unit.value, is_given=is_given)
 
 
 def judge_gyroscope(
@@ -147,7 +147,7 @@ def judge_gyroscope(
     """Unit of the gyro: as given, named, by the rotation of gravity (``turning``), or by magnitude (a warning)."""
     stated = _stated(RateUnit, named, given)
     if stated is None and (is_integer(readings) or named == WHOLE):
-        return Judged(RateUnit.COUNTS, (Finding.of(FindingCode.UNIT_DETECTED, "gyro-counts"),))
+        return Judged(RateUnit.COUNTS, (Finding.of("unit-detected", "gyro-counts"),))
     if stated is not None and (turning is None or stated is RateUnit.COUNTS):
         return Judged(stated, (_statement("gyro", stated, given),))
     if turning is None:
@@ -161,7 +161,7 @@ def judge_gyroscope(
         found = _statement("gyro", unit, given)
     elif turning.fits(unit):
         found = Finding.of(
-            FindingCode.UNIT_DETECTED,
+            "unit-detected",
             "gyro-by-turning",
             unit=unit.value,
             factor=factor,
@@ -170,7 +170,7 @@ def judge_gyroscope(
         )
     elif stated is None:
         found = Finding.of(
-            FindingCode.UNIT_CONTRADICTED,
+            "unit-contradicted",
             "gyro-no-unit",
             unit=unit.value,
             factor=factor,
@@ -180,7 +180,7 @@ def judge_gyroscope(
         )
     else:
         found = Finding.of(
-            FindingCode.UNIT_CONTRADICTED,
+            "unit-contradicted",
             "gyro-by-turning",
             has_fitting=fitting is not None,
             fitting="" if fitting is None else fitting.value,
@@ -204,7 +204,7 @@ def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judg
         unit = RateUnit.MRAD_S if rest > 20.0 else RateUnit.DEG_S
     else:
         unit = RateUnit.RAD_S if rest < 0.1 else RateUnit.DEG_S
-    return Judged(unit, (Finding.of(FindingCode.UNIT_ASSUMED, "gyro", static=rest, largest=largest, unit=unit.value),))
+    return Judged(unit, (Finding.of("unit-assumed", "gyro", static=rest, largest=largest, unit=unit.value),))
 
 
 def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tuple[bool | None, str]:

@@ -21,7 +21,7 @@ from trihedron.read.names import is_rate
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Options, Table
 from trihedron.read.time_column import reject_unread_time, summed_steps, with_arrivals
-from trihedron.records import Finding, FindingCode, Sampling, Severity
+from trihedron.records import Finding, Sampling, Severity
 from trihedron.records.sampling import UNJUDGED
 from trihedron.records.words import Words, words
 
@@ -136,7 +136,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
             accelerometer, gyroscope = gyroscope, accelerometer
             chosen = replace(chosen, accelerometer=chosen.gyroscope, gyroscope=chosen.accelerometer)
         order = why if is_first is None else f"{why}-{'accelerometer' if is_first else 'gyro'}"
-        findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, f"six-{order}", mapping=chosen.mapping()))
+        findings.append(Finding.of("columns-assumed", f"six-{order}", mapping=chosen.mapping()))
     findings.insert(len(table.findings), statement(table, chosen, path.name if sensor else ""))
     for name, triad in (("accelerometer", accelerometer), ("gyroscope", gyroscope)):
         if triad is not None:
@@ -169,7 +169,7 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
         return clock
     findings.append(
         Finding.of(
-            FindingCode.REPEATED_ROWS,
+            "repeated-rows",
             "copies",
             rows_left_out=len(drop),
             where=table.place(int(rows[drop[0]])),
@@ -219,11 +219,11 @@ def _stated_rate(table: Table) -> float | None:
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
     is_given = options.rate_hz is not None
     told = options.rate_hz if is_given else _stated_rate(table)
-    stated = [Finding.of(FindingCode.RATE_STATED, rate_hz=told, is_given=is_given)] if told is not None else []
+    stated = [Finding.of("rate-stated", rate_hz=told, is_given=is_given)] if told is not None else []
     if chosen.time is None:
         rate, has_gyro = told or ASSUMED_RATE_HZ, chosen.gyroscope is not None
         assumed = Finding.of(
-            FindingCode.RATE_ASSUMED, severity=Severity.SERIOUS if has_gyro else Severity.WARNING, has_gyro=has_gyro,
+            "rate-assumed", severity=Severity.SERIOUS if has_gyro else Severity.WARNING, has_gyro=has_gyro,
             rate_hz=rate,
         )  # fmt: skip
         findings += stated or [assumed]
@@ -240,7 +240,7 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
     findings += clock.findings
     rate = mean_rate_hz(clock.time_s)
     if told is not None and abs(rate / told - 1.0) > 0.01:
-        findings.append(Finding.of(FindingCode.RATE_CONTRADICTED, given_hz=told, clock_hz=rate))
+        findings.append(Finding.of("rate-contradicted", given_hz=told, clock_hz=rate))
     return clock, rate
 
 
@@ -252,7 +252,7 @@ def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str
     """
     usual = usual_step(table.columns[column])
     unit = "us" if usual >= LONGEST_MTI_STEP else "100us"
-    findings.append(Finding.of(FindingCode.TIME_UNIT_DETECTED, "sample-time", step=usual, is_us=unit == "us"))
+    findings.append(Finding.of("time-unit-detected", "sample-time", step=usual, is_us=unit == "us"))
     return unit
 
 

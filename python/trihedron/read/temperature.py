@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.read.sensors import Sensors
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 LOWEST_DEGC, HIGHEST_DEGC = -60.0, 150.0
 """Temperatures beyond the operating range of parts, -55 to 125 °C at most, by the error of a thermometer on the die."""
@@ -32,7 +32,7 @@ def temperature_of(sensors: Sensors) -> tuple[FloatArray | None, list[Finding]]:
         return degc, []
     is_column = bool(2 * np.count_nonzero(wrong) > len(wrong))
     found = Finding.of(
-        FindingCode.TEMPERATURE_IMPLAUSIBLE,
+        "temperature-implausible",
         column=label,
         count=np.count_nonzero(wrong),
         is_column=is_column,

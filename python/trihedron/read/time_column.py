@@ -11,7 +11,7 @@ from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 
 def summed_steps(table: Table, chosen: Columns) -> tuple[Table, Columns]:
@@ -21,7 +21,7 @@ def summed_steps(table: Table, chosen: Columns) -> tuple[Table, Columns]:
         if parsed.role != "step" or not len(step) or not (np.all(step >= 0.0) and np.median(step) > 0.0):
             continue
         columns = tuple(np.cumsum(step) if k == i else column for k, column in enumerate(table.columns))
-        note = Finding.of(FindingCode.TIME_UNIT_DETECTED, "sum-of-steps", column=table.label(i))
+        note = Finding.of("time-unit-detected", "sum-of-steps", column=table.label(i))
         table = replace(table, columns=columns, findings=(*table.findings, note))
         return table, replace(chosen, time=i, time_unit=parsed.time_unit)
     return table, chosen

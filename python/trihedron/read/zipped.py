@@ -12,7 +12,7 @@ from trihedron.read.errors import ReadError, errors_of_library, errors_of_system
 from trihedron.read.memory import check_unpacked
 from trihedron.read.names import sensor_said
 from trihedron.read.table import Options, Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.progress import Progress
 
 _OF_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError)
@@ -46,7 +46,7 @@ def read_zip(path: Path, options: Options) -> tuple[Table, ...]:
         ]
     others = [name for name in names if name not in picked]
     if others:
-        note = Finding.of(FindingCode.DEVICE_CHOSEN, "archive", members=picked, n_members=len(picked), others=others)
+        note = Finding.of("device-chosen", "archive", members=picked, n_members=len(picked), others=others)
         tables[0] = replace(tables[0], findings=(note, *tables[0].findings))
     return tuple(tables)
 

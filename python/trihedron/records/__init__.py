@@ -12,7 +12,7 @@ from trihedron.records.calibration import (
     Observability,
     SensorCalibration,
 )
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, Severity
 from trihedron.records.kalman import (
     CONSTANT_NAMES,
     AxisKalmanResult,
@@ -50,7 +50,6 @@ __all__ = [
     "Consistency",
     "ConstantsTrack",
     "Finding",
-    "FindingCode",
     "FitQuality",
     "Frame",
     "GaussMarkov",

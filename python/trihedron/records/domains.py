@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from trihedron.arrays import FloatArray
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.finding import Finding
 from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Plain
 
@@ -93,12 +93,12 @@ class HeldOut(Plain):
     unit: str
 
 
-OF_THE_LINEAR_FIT: Mapping[Domain, frozenset[FindingCode]] = MappingProxyType(
+OF_THE_LINEAR_FIT: Mapping[Domain, frozenset[str]] = MappingProxyType(
     {
-        "static-accel": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.NONLINEAR_RESIDUAL}),
-        "static-gyro": frozenset({FindingCode.GYRO_G_SENSITIVITY, FindingCode.GYRO_BIAS_DRIFT}),
-        "moves": frozenset({FindingCode.RESIDUAL_ABOVE_NOISE, FindingCode.HELD_OUT_WORSE, FindingCode.LOSSES_POSSIBLE}),
-        "dynamics": frozenset({FindingCode.LOSSES_POSSIBLE}),
+        "static-accel": frozenset({"residual-above-noise", "nonlinear-residual"}),
+        "static-gyro": frozenset({"gyro-g-sensitivity", "gyro-bias-drift"}),
+        "moves": frozenset({"residual-above-noise", "held-out-worse", "losses-possible"}),
+        "dynamics": frozenset({"losses-possible"}),
     }
 )
 """Findings about the residuals of the linear fit, by the domain in which they show."""
@@ -110,10 +110,9 @@ def not_explained(findings: Iterable[Finding], remaining: Iterable[DomainTest]) 
     left = [OF_THE_LINEAR_FIT.get(d.domain, frozenset()) for d in remaining if d.disagrees]
     gone = frozenset().union(*OF_THE_LINEAR_FIT.values()).difference(*left)
     # Losses that a counter shows, without a share of the rotation, are facts of the log.
-    by_motion = FindingCode.LOSSES_POSSIBLE in gone
+    by_motion = "losses-possible" in gone
     return tuple(
         f
         for f in findings
-        if f.code not in gone
-        and not (by_motion and f.code is FindingCode.SAMPLES_LOST and "sigma_lost_share" in f.numbers)
+        if f.code not in gone and not (by_motion and f.code == "samples-lost" and "sigma_lost_share" in f.numbers)
     )

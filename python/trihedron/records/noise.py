@@ -12,7 +12,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray, rms_of
 from trihedron.errors import InputError
 from trihedron.records.allan_curve import AllanCurve
-from trihedron.records.finding import Finding, FindingCode, Judged, Severity
+from trihedron.records.finding import Finding, Judged, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Printed
 from trihedron.sanitise import one_line
@@ -21,7 +21,7 @@ FEWEST_READINGS, LEAST_S = 512, 20.0
 """Fewest readings for the separation of noise terms, and least length of a log whose terms are of use."""
 USEFUL_S = 3600.0
 """Length of a static log from which on B and K that do not show are bounded usefully."""
-NOT_OF_THE_SENSOR = (FindingCode.TEMPERATURE_DRIVEN, FindingCode.LOG_TURNED, FindingCode.TWO_LEVELS)
+NOT_OF_THE_SENSOR = ("temperature-driven", "log-turned", "two-levels")
 """Findings of a log whose slow changes are not noise: B, K and R are upper limits of the sensor's own."""
 
 

@@ -18,7 +18,7 @@ from trihedron.arrays import AXES, CORE_MEMORY, FloatArray
 from trihedron.errors import InputError
 from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
 from trihedron.records.onboard import Onboard
 from trihedron.records.presented import Presented
@@ -267,7 +267,7 @@ class Recording(Presented):
     def mapping_with(self, sensor: str, order: Sequence[int]) -> str:
         """The ``--columns`` that reads axis k of a sensor (``a``, ``g``) as its axis ``order[k]``; empty where the log
         is not one file with known columns."""
-        stated = [dict(f.numbers) for f in self.findings if f.code is FindingCode.COLUMNS_RECOGNISED]
+        stated = [dict(f.numbers) for f in self.findings if f.code == "columns-recognised"]
         if len(stated) != 1 or not stated[0]:
             return ""
         moved = {f"{sensor}{AXES[to]}": stated[0].get(f"{sensor}{axis}") for axis, to in zip(AXES, order, strict=True)}

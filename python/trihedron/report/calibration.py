@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 
 from trihedron.arrays import AXES, TINY, XYZ, FloatArray
-from trihedron.records import Calibration, FindingCode, FitQuality, Recording, Segments, SensorCalibration, Severity
+from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, excluded_moves, strong_correlations
@@ -42,7 +42,7 @@ FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "s
 NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`.{USE_IT}{USES}."
 MOST_PAIRS = 6
 """Most correlated pairs in one line; a table lists all of them."""
-DRIFTS = FindingCode.BIAS_DRIFT, FindingCode.GYRO_BIAS_DRIFT
+DRIFTS = "bias-drift", "gyro-bias-drift"
 """Findings that say which bias the stated one is; the verdict says so too."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
 
@@ -88,14 +88,14 @@ def _headlines(calibration: Calibration) -> list[Headline]:
 
 def _drift(calibration: Calibration) -> str:
     """How far the bias of the gyro moves within the recording, where it does: b is then its mean."""
-    moved = [f.numbers for f in calibration.findings if f.code is FindingCode.GYRO_BIAS_DRIFT and f.numbers]
+    moved = [f.numbers for f in calibration.findings if f.code == "gyro-bias-drift" and f.numbers]
     sizes = [plain_number(degrees_from_radians(one["change_rad_s"]), 2) for one in moved]
     return "".join(f"; it changes by up to {size} °/s" for size in sizes)
 
 
 def scale_headlines(calibration: Calibration) -> list[Headline]:
     """The uncertainty of every sensor's scale on its worst axis."""
-    is_assumed = any(finding.code is FindingCode.GRAVITY_DEFAULTED for finding in calibration.findings)
+    is_assumed = any(finding.code == "gravity-defaulted" for finding in calibration.findings)
     uncertain = []
     for name, sensor in calibration.sensors:
         with suppress(ValueError):
@@ -160,11 +160,11 @@ def verdict(calibration: Calibration, errors_beside: str = "") -> str:
     """The verdict: usable or not, how far beyond noise, a gyro bias that drifts, the effects of an extended one."""
     said = errors_in_words(calibration) or errors_beside
     above = f"{WITHIN}{said}" if said else "Usable"
-    if any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in calibration.findings):
+    if any(f.code == "gyroscope-left-out" for f in calibration.findings):
         above += ", for the accelerometer alone"
-    if any(f.code is FindingCode.ACCELEROMETER_NOMINAL for f in calibration.findings):
+    if any(f.code == "accelerometer-nominal" for f in calibration.findings):
         above += ", for the gyro alone"
-    modelled = (f for f in calibration.findings if f.code is FindingCode.EFFECTS_MODELLED)
+    modelled = (f for f in calibration.findings if f.code == "effects-modelled")
     effects = [f.seen for f in modelled if f.severity is not Severity.SERIOUS]
     whole = verdict_of(calibration.findings, "OK: no problems found.", above, "NOT TO BE TRUSTED")
     warned = [f for f in calibration.findings if f.severity is Severity.WARNING]

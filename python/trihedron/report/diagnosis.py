@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table, undetermined
@@ -87,12 +87,12 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     findings: Iterable[Finding] = findings_of(diagnosis)
     if diagnosis.verdict in ("not-testable", "unexplained"):
         # No result to be used, of which the size of gravity would decide.
-        findings = [one for one in findings if one.code is not FindingCode.GRAVITY_DEFAULTED]
+        findings = [one for one in findings if one.code != "gravity-defaulted"]
     found = getattr(diagnosis, "reference", None)
     is_model = found is not None and found.source == model
     if is_model:
         # The motion of a simulated log is that of this one.
-        findings = [one for one in findings if one.code is not FindingCode.REFERENCE_APART]
+        findings = [one for one in findings if one.code != "reference-apart"]
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))
     if diagnosis.residuals:

@@ -3,7 +3,7 @@
 from pathlib import PurePath
 from shlex import quote
 
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.noise import least_length_s
 from trihedron.report.calibration import errors_in_words, errors_of
@@ -53,7 +53,7 @@ def next_step_in_words(diagnosis: Diagnosis, model: str = "", improved: str = ""
             keep = f"Take over the parameters of this log, which are more certain: {_taken_by(model)}."
         return dependent(diagnosis) or (keep if diagnosis.parameters else use)
     # A log of one or two orientations determines neither S nor b.
-    is_static = any(one.code is FindingCode.NOT_FIT for one in findings_of(diagnosis))
+    is_static = any(one.code == "not-fit" for one in findings_of(diagnosis))
     record = "Record 18 or more poses of 3 to 5 s in different orientations (`trihedron plan`)."
     noise = "For the noise of this log: `trihedron allan LOG`."
     if diagnosis.verdict == "not-testable":
@@ -152,7 +152,7 @@ def _in_the_next_log(diagnosis: Diagnosis) -> str:
 def _misread(diagnosis: Diagnosis) -> Finding | None:
     """The finding of the log's own calibration that axes are not those that their columns name."""
     own = getattr(diagnosis, "calibration", None)
-    said = () if own is None else [one for one in own.findings if one.code is FindingCode.LEFT_HANDED]
+    said = () if own is None else [one for one in own.findings if one.code == "left-handed"]
     return next((one for one in said if one.severity is not Severity.NOTE), None)
 
 

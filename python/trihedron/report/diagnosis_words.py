@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trihedron.records import Calibration, Finding, FindingCode, Severity
+from trihedron.records import Calibration, Finding, Severity
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainTest, HeldOut, not_explained
 from trihedron.records.sessions import GEOMETRY
@@ -199,7 +199,7 @@ def findings_of(diagnosis: Diagnosis) -> tuple[Finding, ...]:
 
 def dependent(diagnosis: Diagnosis) -> str:
     """The action for a reference that is not independent; empty where it is or there is none."""
-    return next((str(f.action) for f in findings_of(diagnosis) if f.code is FindingCode.REFERENCE_NOT_INDEPENDENT), "")
+    return next((str(f.action) for f in findings_of(diagnosis) if f.code == "reference-not-independent"), "")
 
 
 def own_serious(diagnosis: Diagnosis) -> Finding | None:
@@ -219,7 +219,7 @@ def serious_beside(diagnosis: Diagnosis, own: Calibration | None) -> Finding | N
 def _not_compared(diagnosis: Diagnosis) -> str:
     """A remark where the gyro was not compared; else empty."""
     found = findings_of(diagnosis)
-    is_out = any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in found)
+    is_out = any(f.code == "gyroscope-left-out" for f in found)
     return "; the gyro was not compared" if is_out else ""
 
 

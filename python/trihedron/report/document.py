@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 
 if TYPE_CHECKING:
     from trihedron.report.chart import Chart
@@ -24,10 +24,10 @@ USE_IT = " Use it: "
 _COMMAND = re.compile(r"`trihedron (\w+) LOG")
 """A command on the same log; where an action and the first step have the same one, they are one step."""
 THEN_RUN = {
-    FindingCode.NOT_OBSERVABLE: "Then record a new log and run this command on it.",
-    FindingCode.WEAKLY_OBSERVABLE: "Then record a new log and run this command on it.",
-    FindingCode.RATE_ASSUMED: "Run `... --rate HZ`.",
-    FindingCode.FILTER_NOISE_UNCALIBRATED: "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
+    "not-observable": "Then record a new log and run this command on it.",
+    "weakly-observable": "Then record a new log and run this command on it.",
+    "rate-assumed": "Run `... --rate HZ`.",
+    "filter-noise-uncalibrated": "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
     "calibration.json LOG -o corrected.csv`, and give corrected.csv to `trihedron noise`.",
 }
 """The command of an action in the next step."""

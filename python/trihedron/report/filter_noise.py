@@ -7,7 +7,6 @@ import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records.filter_noise import RANKED_S, Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share
-from trihedron.records.finding import FindingCode
 from trihedron.records.plain import as_plain
 from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table, action_in_words
@@ -58,7 +57,7 @@ def filter_noise_report(found: FilterNoise) -> Document:
     caption += "with it: predicted from N and K, and actual; cross-validated."
     picture = Picture("horizon", caption, partial(horizon_chart, found))
     # Where a calibration removes most of the error, it comes first.
-    uncalibrated = (action_in_words(f) for f in found.findings if f.code is FindingCode.FILTER_NOISE_UNCALIBRATED)
+    uncalibrated = (action_in_words(f) for f in found.findings if f.code == "filter-noise-uncalibrated")
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
     return Document(
         title="Noise for your filter",

@@ -2,7 +2,6 @@
 
 from collections import Counter
 
-from trihedron.records.finding import FindingCode
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.report.effects.catalogue import experiment
 from trihedron.report.names import finding_in_print, id_in_print
@@ -11,7 +10,7 @@ from trihedron.report.numbers import capital, first_of
 MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
 BY_FILE = "`... --serial '([^/]+)$' -o NEW_FOLDER`: one unit a file"
-RATE_ASSUMED = FindingCode.RATE_ASSUMED.value
+RATE_ASSUMED = "rate-assumed"
 OPEN = ("missing-physics", "unexplained")
 """Verdicts with effects or residuals that the calibration does not include."""
 

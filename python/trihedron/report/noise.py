@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records import AllanCurve, Finding, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.records.noise import of_axes
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
@@ -77,7 +77,7 @@ def _usable(noise: Noise) -> str:
     """The verdict with warnings: how far white noise is determined, on the worst axis."""
     white = [axis.terms[TermName.WHITE] for axis in noise.axes]
     sigma = max((one.sigma / one.value for one in white if one.is_present), default=0.0)
-    causes = " and ".join(words for code, words in IN_SLOW_NOISE.items() if any(f.code is code for f in noise.findings))
+    causes = " and ".join(words for code, words in IN_SLOW_NOISE.items() if any(f.code == code for f in noise.findings))
     alone = " alone," if causes or noise.shows_white_alone else ""
     said = f"white noise N{alone} to ± {plain_number(100.0 * sigma, 2)} % (1 σ, worst axis)"
     return "Usable" + (f": {said}" if sigma else "") + (f": B, K and R contain {causes}" if causes else "")
@@ -88,7 +88,7 @@ def _next(noise: Noise) -> str:
     longer = [LONGER] if noise.shows_white_alone else []
     if not all(customary(TermName.WHITE, axis.unit) for axis in noise.axes):
         # A curve has no counts.
-        is_curve = any(f.code is FindingCode.CURVE_ALONE for f in noise.findings)
+        is_curve = any(f.code == "curve-alone" for f in noise.findings)
         return " ".join([*longer, SAY_UNITS if is_curve else SAY_COUNTS])
     if (actions := [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]) or longer:
         return " ".join(longer or [f"Take N alone into a filter {LINES}.", *actions])
@@ -152,7 +152,7 @@ def _filtered(noise: Noise) -> list[tuple[str, str]]:
         f"{axis_in_print(axis.name)} {plain_number(axis.highest_hz, 3)} Hz"
         for axis in noise.axes
         for finding in axis.findings
-        if finding.code is FindingCode.SPECTRUM_LOW_PASS
+        if finding.code == "spectrum-low-pass"
     ]
     return [("low-pass filtered", f"above {', '.join(limits)}; terms fitted below")] if limits else []
 

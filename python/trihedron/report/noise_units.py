@@ -1,6 +1,6 @@
 """Names and units of noise terms: SI, and those of IEEE 952 that data sheets use."""
 
-from trihedron.records import FindingCode, TermName
+from trihedron.records import TermName
 from trihedron.report.numbers import unit_in_print
 from trihedron.units import arcsec_from_radians, degrees_from_radians, micro_g_from_m_s2, per_hour, per_root_hour
 
@@ -12,9 +12,9 @@ TERM_WORDS = {
     TermName.RATE_RAMP: "ramp",
 }
 IN_SLOW_NOISE = {
-    FindingCode.TEMPERATURE_DRIVEN: "the temperature",
-    FindingCode.LOG_TURNED: "a turn of the unit",
-    FindingCode.TWO_LEVELS: "a level that switches",
+    "temperature-driven": "the temperature",
+    "log-turned": "a turn of the unit",
+    "two-levels": "a level that switches",
 }
 """What B, K and R contain where a finding says so."""
 QUANTITIES = {"rad/s": "rate", "deg/s": "rate", "m/s^2": "acceleration", "g": "acceleration"}

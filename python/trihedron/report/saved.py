@@ -13,7 +13,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.files.output import check_report
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.records.plain import is_array
 from trihedron.report import chart, document
 from trihedron.report.document import Document, Picture
@@ -118,7 +118,7 @@ _SAID = ("code", "severity", "seen", "cause", "action")
 
 def _finding(value: dict[str, Any]) -> Finding:
     code, severity, *said = (_checked(value[name], str) for name in _SAID)
-    return Finding(FindingCode(code), Severity(severity), *said)
+    return Finding(code, Severity(severity), *said)
 
 
 def _line(values: FloatArray) -> str:

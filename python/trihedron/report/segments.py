@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ, FloatArray
-from trihedron.records import Finding, FindingCode, Pose, Recording, Segments, Severity, Truth
+from trihedron.records import Finding, Pose, Recording, Segments, Severity, Truth
 from trihedron.records.noise import least_length_s
 from trihedron.report.channels import logged_sensors
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Points, Scale, Span
@@ -53,7 +53,7 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
 
 def _is_of_noise(segments: Segments, recording: Recording) -> bool:
     """Whether a log has too few poses for S and b, and these are as long as a log for noise."""
-    has_few = any(one.code is FindingCode.FEW_POSES for one in segments.findings)
+    has_few = any(one.code == "few-poses" for one in segments.findings)
     return has_few and _still_s(segments) >= segments.n_poses * least_length_s(recording.rate_hz)
 
 
@@ -76,7 +76,7 @@ def recording_facts(recording: Recording, segments: Segments | None = None) -> t
 
 def rate_in_words(rate_hz: float, findings: Iterable[Finding], digits: int) -> str:
     """The sampling rate, and whether it was assumed: times and lengths follow from it."""
-    is_assumed = any(one.code is FindingCode.RATE_ASSUMED for one in findings)
+    is_assumed = any(one.code == "rate-assumed" for one in findings)
     return f"{plain_number(rate_hz, digits)} Hz{' (assumed)' if is_assumed else ''}"
 
 

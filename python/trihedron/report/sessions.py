@@ -8,7 +8,7 @@ from pathlib import PurePath
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.records import FindingCode, Severity
+from trihedron.records import Severity
 from trihedron.records.recording import distinct_names
 from trihedron.records.sessions import (
     PARAMETERS,
@@ -71,14 +71,14 @@ def sessions_report(model: SessionsModel) -> Document:
     usable = f"Usable: {agree}"
     if changed:
         parameters = ids_in_print(dict.fromkeys(change.id for change in changed))
-        is_one = all(finding.code is not FindingCode.SEVERAL_DEVICES for finding in model.findings)
+        is_one = all(finding.code != "several-devices" for finding in model.findings)
         word = "Usable with the spread below" if is_one else SEVERAL
         odd = {change.where if change.kind == "apart" else "" for change in changed}
         usable = f"{word}: {parameters} changed between {used}"
         if len(odd) == 1 and any(odd):
             usable = f"{word}: {odd.pop()} differs from the others of {used} in {parameters}"
     usable += "" if usable.startswith(SEVERAL) else _worst(model)
-    stated = (FindingCode.SEVERAL_DEVICES, FindingCode.PARAMETERS_CHANGED) if changed else ()
+    stated = ("several-devices", "parameters-changed") if changed else ()
     others = [one for one in model.findings if one.code not in stated or one.severity is Severity.SERIOUS]
     return Document(
         title="Calibration from many recordings",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.records import Finding, FindingCode, Recording, SensorCalibration, Severity, TermName, Truth
+from trihedron.records import Finding, Recording, SensorCalibration, Severity, TermName, Truth
 from trihedron.report.calibration import parameter_table
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, likely, verdict_of
@@ -43,10 +43,10 @@ def simulation_report(
         what = f"Digital twin of {repeated}: its {poses}, {moves}, noise, resolution and range limits met, with the "
         what += "S and b of the calibration and no further effect"
     verdict = verdict_of(findings, f"{what}. The truth below is not in the log.", what, "NOT TO BE TRUSTED")
-    if any(f.code is FindingCode.CLIPPING for f in findings):
+    if any(f.code == "clipping" for f in findings):
         verdict += f" Clipping is in {repeated}: motion beyond its range is extrapolated."
     # A serious one is in the verdict with its cause.
-    doubts = [f for f in findings if f.code is FindingCode.STATIC_FORCE and f.severity is Severity.WARNING]
+    doubts = [f for f in findings if f.code == "static-force" and f.severity is Severity.WARNING]
     caption = "The simulated log; shaded where the body was truly static."
     return Document(
         title="Simulation",

@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron.arrays import XYZ, BoolArray, FloatArray, rms_of
 from trihedron.probability import chdtri
-from trihedron.records import Finding, FindingCode, Recording, Segments, Severity, Verification
+from trihedron.records import Finding, Recording, Segments, Severity, Verification
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel, Points, Scale
@@ -21,9 +21,9 @@ from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 _ABOVE_NOISE = {
-    FindingCode.RESIDUAL_ABOVE_NOISE: "gravity error in static poses",
-    FindingCode.HELD_OUT_WORSE: "tilt error after a rotation",
-    FindingCode.STATIC_RATE_ABOVE_NOISE: "gyro rate in static poses",
+    "residual-above-noise": "gravity error in static poses",
+    "held-out-worse": "tilt error after a rotation",
+    "static-rate-above-noise": "gyro rate in static poses",
 }
 USES = "`trihedron apply FILE LOG -o corrected.csv`, `trihedron export FILE --to c -o calibration.h`"
 """What a calibration is for, in the next steps of reports."""
@@ -71,7 +71,7 @@ def above_noise(v: Verification) -> list[Finding]:
 
 def imprecise(findings: Sequence[Finding]) -> list[Finding]:
     """Findings that a calibration is less certain than the log's own."""
-    return [finding for finding in findings if finding.code is FindingCode.CALIBRATION_IMPRECISE]
+    return [finding for finding in findings if finding.code == "calibration-imprecise"]
 
 
 def verified_in_words(v: Verification) -> str:
@@ -97,17 +97,17 @@ def verified_in_words(v: Verification) -> str:
 
 def _shifts(v: Verification) -> list[Finding]:
     """The finding that parameters differ from the file; they may where the errors agree."""
-    return [one for one in v.findings if one.code is FindingCode.CALIBRATION_SHIFT and "n_others" in one.numbers]
+    return [one for one in v.findings if one.code == "calibration-shift" and "n_others" in one.numbers]
 
 
 def _is_untested(v: Verification) -> bool:
-    return any(finding.code is FindingCode.NOT_TESTED for finding in v.findings)
+    return any(finding.code == "not-tested" for finding in v.findings)
 
 
 def use_in_words(v: Verification, what: str) -> str:
     """Advice about errors above noise; else to use the calibration, unless it is rejected."""
     above = above_noise(v)
-    if any(one.code is FindingCode.EFFECT_NOT_APPLIED and one.severity is Severity.WARNING for one in v.findings):
+    if any(one.code == "effect-not-applied" and one.severity is Severity.WARNING for one in v.findings):
         return ""  # errors are those of an effect that this log lacks the channel for
     use = f"Use {what}: {USES}." if v.is_passed and not _is_untested(v) else ""
     shifts = _shifts(v)
@@ -153,10 +153,10 @@ def headlines_of(v: Verification) -> tuple[Headline, ...]:
         for what, rms, unit, of, allowed, _ in _errors(v)
     ]
     gravest = next(iter(by_weight(above_noise(v))), None)
-    code = FindingCode.RESIDUAL_ABOVE_NOISE if gravest is None else gravest.code
+    code = "residual-above-noise" if gravest is None else gravest.code
     for one in v.findings:
-        if one.code is FindingCode.LIMIT_EXCEEDED:
-            code = FindingCode.HELD_OUT_WORSE if "limit_deg" in one.numbers else FindingCode.RESIDUAL_ABOVE_NOISE
+        if one.code == "limit-exceeded":
+            code = "held-out-worse" if "limit_deg" in one.numbers else "residual-above-noise"
             break
     moved = [
         Headline("gyro bias changed by", changes.replace(" ± ", "\u00a0±\u00a0"), "°/s", WITH_DRIFT)

@@ -5,7 +5,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import FloatArray
 from trihedron.probability import FALSE_ALARM
-from trihedron.records import Finding, FindingCode, Pose, Recording
+from trihedron.records import Finding, Pose, Recording
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, mean_present
 from trihedron.segment.floor import clipped_channel
@@ -36,7 +36,7 @@ def judge_runs(
         worst, k = max(creeping)
         found.append(
             Finding.of(
-                FindingCode.POSE_SETTLING, poses=len(creeping), worst_pose=k + 1,
+                "pose-settling", poses=len(creeping), worst_pose=k + 1,
                 worst_s=_start_s(recording, poses[k]), worst_sigmas=worst, which=_named([c for _, c in creeping]),
             )
         )  # fmt: skip
@@ -46,7 +46,7 @@ def judge_runs(
         lost = sum(b - a for a, b in spans) / recording.rate_hz
         found.append(
             Finding.of(
-                FindingCode.POSE_DISTURBED, disturbances=len(spans), poses=len(disturbed), which=_named(disturbed),
+                "pose-disturbed", disturbances=len(spans), poses=len(disturbed), which=_named(disturbed),
                 left_out_s=lost, first_s=recording.time_s[spans[0][0]],
             )
         )  # fmt: skip
@@ -54,7 +54,7 @@ def judge_runs(
     if unsteady:
         first_s = _start_s(recording, poses[unsteady[0]])
         which = _named(unsteady)
-        found.append(Finding.of(FindingCode.POSE_UNSTEADY, poses=len(unsteady), which=which, first_s=first_s))
+        found.append(Finding.of("pose-unsteady", poses=len(unsteady), which=which, first_s=first_s))
     return found
 
 
@@ -88,7 +88,7 @@ def without_cut(recording: Recording, channels: Channels, runs: list[Run]) -> tu
     mean = means_of(channels.mean, [run.quiet_ranges()])[0, axis]
     values = [limit.value for limit in recording.facts.of("accelerometer").limits if limit.axis == axis]
     said = Finding.of(
-        FindingCode.POSE_AT_RANGE_LIMIT,
+        "pose-at-range-limit",
         poses=len(clipped),
         first_s=float(recording.time_s[run.first * channels.length]),
         axis=axis + 1,
@@ -114,16 +114,16 @@ def judge_log(recording: Recording, channels: Channels, n: int) -> list[Finding]
     # Five whole blocks make a window, and a block begins anywhere in the log.
     least_s = max(LEAST_POSE_S, (WINDOW_BLOCKS + 1) * channels.step_s)
     if n == 0:
-        is_assumed = any(one.code is FindingCode.RATE_ASSUMED for one in recording.findings)
+        is_assumed = any(one.code == "rate-assumed" for one in recording.findings)
         is_short = duration < POSES_FOR_NINE * LEAST_POSE_S
         said = Finding.of(
-            FindingCode.NOT_STATIC, rows=recording.n_samples, duration_s=duration, poses=0, least_s=least_s,
+            "not-static", rows=recording.n_samples, duration_s=duration, poses=0, least_s=least_s,
             is_assumed=is_assumed, is_short=is_short, is_slow=least_s > LEAST_POSE_S,
         )  # fmt: skip
         return [said]
     if n >= POSES_FOR_NINE:
         return []
-    return [Finding.of(FindingCode.FEW_POSES, poses=n, duration_s=duration, needed=POSES_FOR_NINE, least_s=least_s)]
+    return [Finding.of("few-poses", poses=n, duration_s=duration, needed=POSES_FOR_NINE, least_s=least_s)]
 
 
 def judge_vibration(
@@ -135,7 +135,7 @@ def judge_vibration(
     gravity = float(np.median(np.linalg.norm(means.mean[:, ~gyro], axis=1))) if poses else 0.0
     share = float(sigma[~gyro].max(initial=0.0)) / gravity if gravity > 0.0 else 0.0
     if share > LARGEST_NOISE_G:
-        return [Finding.of(FindingCode.POSES_VIBRATE, scatter_g=share)]
+        return [Finding.of("poses-vibrate", scatter_g=share)]
     scale = rate_to_si(recording.gyroscope_unit)
     # A mean of readings on one code is uncertain by the code, not by motion.
     gyro = gyro & (sigma**2 > channels.quantisation_variance)
@@ -143,7 +143,7 @@ def judge_vibration(
         return []
     length_s = np.array([pose.stop - pose.start for pose in poses]) / recording.rate_hz
     density = scale * float(np.median(np.sqrt(2.0 * length_s) * means.sigma[:, gyro].max(axis=1)))
-    return [Finding.of(FindingCode.POSES_VIBRATE, "held", density=density)] if density > LARGEST_DENSITY else []
+    return [Finding.of("poses-vibrate", "held", density=density)] if density > LARGEST_DENSITY else []
 
 
 def judge_settling(one: Settling, means: PoseMeans) -> Finding:
@@ -151,7 +151,7 @@ def judge_settling(one: Settling, means: PoseMeans) -> Finding:
     share, sigma, force = 100.0 * one.share, 100.0 * one.sigma, means.mean[:, :3]
     gravity = float(np.max(np.ptp(force, axis=0))) / 2.0
     return Finding.of(
-        FindingCode.BIAS_SETTLING, x_percent=share[0], y_percent=share[1], z_percent=share[2],
+        "bias-settling", x_percent=share[0], y_percent=share[1], z_percent=share[2],
         sigma_percent=sigma.max(), tau_s=one.tau_s, p_value=one.p_value, wait_s=3.0 * one.tau_s,
         mean_mg=1e3 / gravity * float(np.sqrt(np.mean(np.sum(one.mean**2, axis=1)))),
     )  # fmt: skip

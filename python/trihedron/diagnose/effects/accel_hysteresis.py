@@ -7,7 +7,6 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes, per_axis
-from trihedron.records.finding import FindingCode
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 """Half-widths tried, a twentieth to half of g, then refined; above g the play never reverses in poses."""
@@ -26,7 +25,7 @@ class AccelHysteresis(Effect):
         return np.full(3, PLAY_M_S2 if variant.label == "play" else CREEP)
 
     def variants(self, context: Context) -> list[Variant]:
-        seen = [one.numbers["tau_s"] for one in context.obs.segments.findings if one.code is FindingCode.BIAS_SETTLING]
+        seen = [one.numbers["tau_s"] for one in context.obs.segments.findings if one.code == "bias-settling"]
         creeps = [_creep(context, tau) for tau in (*CREEP_TIMES_S, *seen)]
         return [_play(context, width) for width in PLAY_WIDTHS_M_S2] + creeps
 

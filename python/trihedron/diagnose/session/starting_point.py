@@ -10,7 +10,6 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records import Calibration, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import LinearModel
-from trihedron.records.finding import FindingCode
 from trihedron.sensor_model import in_frame
 from trihedron.session.model import LOWER, Prior, SessionState
 from trihedron.transforms import directions_of
@@ -65,7 +64,7 @@ def is_open(calibration: Calibration) -> bool:
 def starts_nominal(calibration: Calibration) -> bool:
     """Whether the fit of a session starts from nominal values: its poses leave the accelerometer undetermined, or so
     many moves met the gyro's range limit that the others leave the gyro undetermined."""
-    left_out = (f for f in calibration.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT)
+    left_out = (f for f in calibration.findings if f.code == "gyroscope-left-out")
     return is_open(calibration) or any("n_lost" in f.numbers for f in left_out)
 
 

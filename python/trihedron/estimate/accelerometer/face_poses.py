@@ -8,7 +8,7 @@ from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
-from trihedron.records import Finding, FindingCode, Segments
+from trihedron.records import Finding, Segments
 from trihedron.records.words import Words, words
 from trihedron.session.rounding import undithered_axes
 from trihedron.units import AccelerationUnit, acceleration_to_si
@@ -149,7 +149,7 @@ def left_out(faces: IntArray, values: FloatArray) -> Iterator[Finding]:
     if len(left) == 0:
         return
     yield Finding.of(
-        FindingCode.POSE_NOT_A_FACE,
+        "pose-not-a-face",
         n_left_out=len(left),
         n_poses=len(values),
         largest_tilt_deg=LARGEST_TILT_DEG,

@@ -22,7 +22,7 @@ from trihedron.estimate.case_frame import (
     fit_case,
     spread_over,
 )
-from trihedron.records import Finding, FindingCode, FitQuality, Observability, SensorCalibration, Severity
+from trihedron.records import Finding, FitQuality, Observability, SensorCalibration, Severity
 from trihedron.records.words import words
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
@@ -216,7 +216,7 @@ def tilt_findings(
     across = np.take_along_axis(residual, across_faces(faces), axis=1)
     worst, tilt_deg = int(np.argmax(np.linalg.norm(across, axis=1))), degrees_from_radians(lean)
     yield Finding.of(
-        FindingCode.TABLE_TILT,
+        "table-tilt",
         chi2_per_dof=fit.chi2 / fit.dof,
         severity=Severity.SERIOUS if tilt_deg > face_poses.LARGEST_TILT_DEG else Severity.WARNING,
         tilt_deg=tilt_deg,

@@ -6,7 +6,7 @@ from trihedron import _core
 from trihedron.estimate.accelerometer.norm import N_PARAMETERS
 from trihedron.estimate.accelerometer.poses import PoseDesign
 from trihedron.probability import FALSE_ALARM
-from trihedron.records import Calibration, Finding, FindingCode, Segments
+from trihedron.records import Calibration, Finding, Segments
 from trihedron.sensor_model import correct
 from trihedron.transforms import directions_of
 
@@ -34,7 +34,7 @@ def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, 
         return calibration.findings
     _, is_cubic, is_unlike = (one > best - AS_WELL for one in odds)
     said = Finding.of(
-        FindingCode.NONLINEAR_RESIDUAL,
+        "nonlinear-residual",
         "poses",
         is_quadratic=float(odds[0] == best),
         is_cubic=float(is_cubic),

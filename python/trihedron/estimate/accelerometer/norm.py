@@ -11,7 +11,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.accelerometer import verdict
 from trihedron.estimate.accelerometer.face_poses import are_six_faces
 from trihedron.estimate.accelerometer.poses import PoseDesign, wrt_relative_errors
-from trihedron.records import Finding, FindingCode, FitQuality, SensorCalibration
+from trihedron.records import Finding, FitQuality, SensorCalibration
 from trihedron.records.words import words
 from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit
@@ -102,10 +102,10 @@ def _assemble(
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], apart[:, 2], dof),
     ]
     if dof == 0:
-        findings.append(Finding.of(FindingCode.FEW_POSES, "untested", poses=N_PARAMETERS))
+        findings.append(Finding.of("few-poses", "untested", poses=N_PARAMETERS))
     if not fit.is_converged:
         why = words(fit.stopped_because)
-        findings.append(Finding.of(FindingCode.NOT_CONVERGED, "accelerometer", stopped_because=why))
+        findings.append(Finding.of("not-converged", "accelerometer", stopped_because=why))
     sensor = SensorCalibration(
         S=S,
         b=fit.b,

@@ -7,7 +7,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.accelerometer.poses import PoseDesign, parameter_names
-from trihedron.records import Finding, FindingCode, FitQuality
+from trihedron.records import Finding, FitQuality
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 SIGNIFICANCE = 0.01
@@ -33,7 +33,7 @@ def residual_findings(
     is_held = quality.held_out_rms is not None
     rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
     yield Finding.of(
-        FindingCode.RESIDUAL_ABOVE_NOISE,
+        "residual-above-noise",
         "poses",
         rms_m_s2=rms,
         is_held_out=is_held,
@@ -64,7 +64,7 @@ def observability_findings(
     """No finding, WEAKLY_OBSERVABLE or NOT_OBSERVABLE, with the poses to add; ``are_faces``: method 1 would apply."""
     if design.rank < 9:
         yield Finding.of(
-            FindingCode.NOT_OBSERVABLE,
+            "not-observable",
             "poses-rank",
             rank=design.rank,
             n_parameters=9,
@@ -80,10 +80,10 @@ def observability_findings(
     is_weak = worst > WEAK_PREDICTION * relative_sigma
     if is_anchored and not is_weak:
         # Other orientations would not help: each pose by itself is uncertain.
-        yield Finding.of(FindingCode.NOT_OBSERVABLE, "poses-uncertain", measured_g=relative_sigma)
+        yield Finding.of("not-observable", "poses-uncertain", measured_g=relative_sigma)
     elif is_anchored:
         yield Finding.of(
-            FindingCode.NOT_OBSERVABLE,
+            "not-observable",
             "poses-weak",
             at_worst=min(worst, 1.0),
             weakest=design.weakest(),
@@ -96,7 +96,7 @@ def observability_findings(
         )
     elif is_weak:
         yield Finding.of(
-            FindingCode.WEAKLY_OBSERVABLE,
+            "weakly-observable",
             "poses",
             worst_prediction_g=worst,
             measured_g=relative_sigma,
@@ -124,7 +124,7 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
     z[seen] = held_out[seen] / (sigma[seen] * spread[seen])
     limit = float(-probability.stdtrit(dof - 1, SIGNIFICANCE / (2 * n)))
     return [
-        Finding.of(FindingCode.OUTLIER_POSE, pose=int(i) + 1, held_out_m_s2=held_out[i], z=z[i], limit=limit)
+        Finding.of("outlier-pose", pose=int(i) + 1, held_out_m_s2=held_out[i], z=z[i], limit=limit)
         for i in np.flatnonzero(np.abs(z) > limit)
     ]
 
@@ -137,7 +137,7 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit) -> Iterator[Findin
     """Findings for a left-handed triad, and for scales that contradict the unit of the log."""
     if np.linalg.det(S) < 0:
         signs = "".join("+" if s > 0 else "-" for s in np.diag(S))
-        yield Finding.of(FindingCode.LEFT_HANDED, "accelerometer", signs=signs, det_S_sign=-1.0)
+        yield Finding.of("left-handed", "accelerometer", signs=signs, det_S_sign=-1.0)
     nominal = acceleration_to_si(raw_unit)
     if nominal is not None:
         ratio = np.linalg.norm(S, axis=0) / nominal
@@ -147,7 +147,7 @@ def model_findings(S: FloatArray, raw_unit: AccelerationUnit) -> Iterator[Findin
         if abs(apart[worst]) > OFF_NOMINAL:
             is_common = bool(np.ptp(apart) < OFF_NOMINAL)
             yield Finding.of(
-                FindingCode.SCALE_NOT_NOMINAL,
+                "scale-not-nominal",
                 "accelerometer",
                 axis=worst + 1,
                 scale_ratio=np.exp(apart.mean() if is_common else apart[worst]),

@@ -7,7 +7,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.findings import WEAK
 from trihedron.probability import stdtrit
-from trihedron.records import Finding, FindingCode, Recording
+from trihedron.records import Finding, Recording
 from trihedron.units import RateUnit, rate_to_si
 
 MAX_SCALE_RATIO = 1.25
@@ -34,7 +34,7 @@ def scale_findings(S: FloatArray, sigma: float, recording: Recording) -> Iterato
         fitting = min(ratios, key=lambda one: abs(np.log(ratios[one])))
         has_fitting = bool(abs(np.log(ratios[fitting])) < np.log(MAX_SCALE_RATIO))
         yield Finding.of(
-            FindingCode.SCALE_NOT_NOMINAL,
+            "scale-not-nominal",
             "gyro",
             scale_ratio=np.exp(common),
             unit=raw_unit.value,
@@ -45,7 +45,7 @@ def scale_findings(S: FloatArray, sigma: float, recording: Recording) -> Iterato
     # Sensitivities differ from axis to axis; what all three have in common and data sheets exclude may be the time.
     elif abs(common) > WEAK and abs(common) > -stdtrit(2, ONE_FACTOR / 2.0) * spread / np.sqrt(3.0):
         yield Finding.of(
-            FindingCode.SCALE_NOT_NOMINAL,
+            "scale-not-nominal",
             "gyro-common",
             excess=np.expm1(common),
             spread=spread,
@@ -56,6 +56,6 @@ def scale_findings(S: FloatArray, sigma: float, recording: Recording) -> Iterato
 
 def without_first_scale(findings: Iterable[Finding], fitted: Iterable[Finding]) -> tuple[Finding, ...]:
     """Findings without the reader's estimate of a scale that the fit found again, more exactly."""
-    is_fitted = any(one.code is FindingCode.SCALE_NOT_NOMINAL and "right_hz" in one.numbers for one in fitted)
-    is_first = (FindingCode.UNIT_CONTRADICTED, True)
+    is_fitted = any(one.code == "scale-not-nominal" and "right_hz" in one.numbers for one in fitted)
+    is_first = ("unit-contradicted", True)
     return tuple(one for one in findings if not (is_fitted and (one.code, "right_hz" in one.numbers) == is_first))

@@ -15,7 +15,6 @@ from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import FALSE_ALARM, chdtrc, fdtrc
 from trihedron.records import (
     Finding,
-    FindingCode,
     Observability,
     Recording,
     SensorCalibration,
@@ -42,7 +41,7 @@ def findings_of(
     yield from handedness(S, solution.S_a, recording, worst_sigma(gyroscope.covariance[:9, :9], S))
     yield from observability_findings(observability, gyroscope.covariance[:9, :9], S, measured)
     if not solution.is_converged:
-        yield Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because)
+        yield Finding.of("not-converged", "session", stopped_because=solution.stopped_because)
     yield from _outlier_findings(outliers, measured, seen)
     dof = max(solution.moves_dof, 1.0)
     chi2_per_dof = solution.moves_chi2 / dof
@@ -50,7 +49,7 @@ def findings_of(
         # Widened uncertainties do not cover convergence to a wrong minimum: large tilt errors are serious.
         is_astray = usual_deg(seen.angle_deg, measured, solution.S_a, solution.b_a) > ASTRAY_DEG
         yield Finding.of(
-            FindingCode.RESIDUAL_ABOVE_NOISE,
+            "residual-above-noise",
             "moves",
             severity=Severity.SERIOUS if is_astray else Severity.WARNING,
             chi2_per_dof=chi2_per_dof,
@@ -88,17 +87,15 @@ def handedness(
         case True, 0:
             return
         case True, 1:
-            yield Finding.of(FindingCode.LEFT_HANDED, "gyro-reversed", axis=others[0])
+            yield Finding.of("left-handed", "gyro-reversed", axis=others[0])
         case True, 2:
             (right,) = {0, 1, 2} - set(against)
             signs = "".join("-" if (S_accelerometer[i, i] < 0.0) != (i == right) else "+" for i in range(3))
-            yield Finding.of(
-                FindingCode.LEFT_HANDED, "accelerometer-reversed", axis=right + 1, axes=others, signs=signs
-            )
+            yield Finding.of("left-handed", "accelerometer-reversed", axis=right + 1, axes=others, signs=signs)
         case True, 3:
             is_stated = float(np.linalg.det(S_accelerometer)) < 0.0
             yield Finding.of(
-                FindingCode.LEFT_HANDED,
+                "left-handed",
                 "both-sensors",
                 severity=Severity.SERIOUS if is_stated else Severity.WARNING,
                 is_stated=is_stated,
@@ -107,7 +104,7 @@ def handedness(
             # All three reversed: the accelerometer's columns are exchanged.
             directions = [(i in against and len(against) < 3, order[i] + 1) for i in range(3)]
             yield Finding.of(
-                FindingCode.LEFT_HANDED,
+                "left-handed",
                 "gyro-other-axes",
                 directions=directions,
                 has_columns=bool(mapping),
@@ -118,11 +115,11 @@ def handedness(
 def _turned(axes: FloatArray) -> Finding:
     """LEFT_HANDED for the gyro's ``axes`` (3, 3), orthonormal, turned or mirrored against the accelerometer's."""
     if np.linalg.det(axes) < 0.0:
-        return Finding.of(FindingCode.LEFT_HANDED, "gyro-mirrored")
+        return Finding.of("left-handed", "gyro-mirrored")
     vector = _core.vector_from_rotation(axes[None])[0]
     angle = float(np.linalg.norm(vector))
     return Finding.of(
-        FindingCode.LEFT_HANDED, "gyro-turned", angle_deg=degrees_from_radians(angle), about=(vector / angle).tolist()
+        "left-handed", "gyro-turned", angle_deg=degrees_from_radians(angle), about=(vector / angle).tolist()
     )
 
 
@@ -132,7 +129,7 @@ def _outlier_findings(outliers: tuple[int, ...], measured: MoveMeasurements, see
         sigma = float(np.sqrt(seen.covariance[index].trace() / 2.0))
         size = float(np.linalg.norm(seen.residual[index]))
         yield Finding.of(
-            FindingCode.OUTLIER_MOVE,
+            "outlier-move",
             "gap" if measured.is_gapped[index] else "timed",
             move=int(index) + 1,
             before=before + 1,
@@ -150,7 +147,7 @@ def _g_sensitivity_findings(measured: MoveMeasurements, solution: SessionSolutio
     rate, force = (int(k) for k in np.unravel_index(int(np.argmax(np.abs(G))), (3, 3)))
     is_material = _is_material(np.abs(np.linalg.solve(solution.S_w, G)).max(axis=1), measured)
     yield Finding.of(
-        FindingCode.GYRO_G_SENSITIVITY,
+        "gyro-g-sensitivity",
         severity=Severity.WARNING if is_material else Severity.NOTE,
         per_g_rad_s=abs(G[rate, force]),
         sigma_per_g_rad_s=sigma[rate, force],
@@ -179,7 +176,7 @@ def drift_findings(case: str, measured: MoveMeasurements, S: FloatArray) -> Iter
     change = np.ptp(bias, axis=0) * np.linalg.norm(S, axis=0)
     axis = int(np.argmax(excess))
     yield Finding.of(
-        FindingCode.GYRO_BIAS_DRIFT,
+        "gyro-bias-drift",
         case,
         change_rad_s=change[axis],
         axis=axis + 1,
@@ -193,7 +190,7 @@ def audit_moves(measured: MoveMeasurements) -> Iterator[Finding]:
         which = [int(i) + 1 for i in np.flatnonzero(measured.clipped_s > 0.0)]
         lost = int(np.count_nonzero(measured.is_lost))
         yield Finding.of(
-            FindingCode.CLIPPING,
+            "clipping",
             "moves",
             moves=len(which),
             n_moves=measured.n_moves,
@@ -204,7 +201,7 @@ def audit_moves(measured: MoveMeasurements) -> Iterator[Finding]:
         )
     if np.any(measured.is_gapped):
         which = [int(i) + 1 for i in np.flatnonzero(measured.is_gapped)]
-        yield Finding.of(FindingCode.TIME_GAP, "moves", moves=len(which), n_moves=measured.n_moves, which=which)
+        yield Finding.of("time-gap", "moves", moves=len(which), n_moves=measured.n_moves, which=which)
 
 
 # Which parameters the moves determine, in words, with the moves to add.
@@ -270,7 +267,7 @@ def observability_findings(
         n, n_moves = observability.n_parameters, measured.n_moves
         if 2 * lost > n_moves:
             yield Finding.of(
-                FindingCode.NOT_OBSERVABLE,
+                "not-observable",
                 "moves-clipped",
                 rank=rank,
                 n_parameters=n,
@@ -279,12 +276,10 @@ def observability_findings(
                 n_moves=n_moves,
             )
         else:
-            yield Finding.of(
-                FindingCode.NOT_OBSERVABLE, "moves-rank", rank=rank, n_parameters=n, weakest=weakest, advice=advice
-            )
+            yield Finding.of("not-observable", "moves-rank", rank=rank, n_parameters=n, weakest=weakest, advice=advice)
         return
     worst = worst_sigma(covariance, S)
     if worst > HARDLY_SEEN:
-        yield Finding.of(FindingCode.NOT_OBSERVABLE, "moves-weak", weakest=observability.weakest, advice=advice)
+        yield Finding.of("not-observable", "moves-weak", weakest=observability.weakest, advice=advice)
     elif worst > WEAK:
-        yield Finding.of(FindingCode.WEAKLY_OBSERVABLE, "moves", weakest=observability.weakest, advice=advice)
+        yield Finding.of("weakly-observable", "moves", weakest=observability.weakest, advice=advice)

@@ -8,7 +8,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.ranges import rows_beside
-from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
+from trihedron.records import Finding, Recording, Segments, Severity
 from trihedron.session.averaging import GAP
 from trihedron.session.joints import STRONG, Joints, joints
 
@@ -46,7 +46,7 @@ class PossibleLosses:
     def findings(self, sigma_scale: float) -> Iterator[Finding]:
         """Finding where the scale may lack more than ``sigma_scale``, its relative standard uncertainty without."""
         if self.of_scale > sigma_scale:
-            yield Finding.of(FindingCode.LOSSES_POSSIBLE, lost_share=self.share, sigma_scale=sigma_scale)
+            yield Finding.of("losses-possible", lost_share=self.share, sigma_scale=sigma_scale)
 
 
 def relative_sigma(covariance: FloatArray, S: FloatArray) -> float:
@@ -139,7 +139,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
         return []
     return [
         Finding.of(
-            FindingCode.SAMPLES_LOST,
+            "samples-lost",
             "seen-in-motion",
             severity=Severity.SERIOUS if share > sigma_scale else Severity.WARNING,
             losses=n,

@@ -16,7 +16,7 @@ from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
 from trihedron.estimate.gyroscope.turntable import StatedRates, moved_to, not_fitted, with_parameters
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
-from trihedron.records import Calibration, Finding, FindingCode, Move, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, Move, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import correct
 from trihedron.transforms import directions_of
 
@@ -151,12 +151,12 @@ def by_quarters(turns: TableTurns, calibration: Calibration) -> tuple[TableTurns
     is_wrong = is_told & ~is_used & (np.abs(seen) > LEAST_RAD)
     said = [
         Finding.of(
-            FindingCode.TURN_NOT_A_MULTIPLE, "no-multiple", turn=int(turns.numbers[k]), at_s=float(turns.begin_s[k]),
+            "turn-not-a-multiple", "no-multiple", turn=int(turns.numbers[k]), at_s=float(turns.begin_s[k]),
             axis=int(turns.axes[k]), seen_rad=seen[k],
         )
         for k in np.flatnonzero(is_wrong)
     ]  # fmt: skip
-    return found, said if np.all(is_told) else [*said, Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)]
+    return found, said if np.all(is_told) else [*said, Finding.of("turn-angle-unknown")]
 
 
 def on_stated_turns(
@@ -181,22 +181,22 @@ def on_stated_turns(
     missed = (rates.predicted(updated.values)[0] - rates.speeds) / rates.unit
     found = [
         Finding.of(
-            FindingCode.TURN_NOT_A_MULTIPLE, "left-out" if k in wrong else "contradicted", turn=int(turns.numbers[k]),
+            "turn-not-a-multiple", "left-out" if k in wrong else "contradicted", turn=int(turns.numbers[k]),
             at_s=float(turns.begin_s[k]), is_stated=turns.is_stated, angle_rad=angles[k], axis=int(turns.axes[k]),
             deviation_rad=abs(missed[k]),
         )
         for k in (*wrong, *either)
     ]  # fmt: skip
     if updated.scatter > LOOSE_RAD:
-        found.append(Finding.of(FindingCode.TURN_NOT_A_MULTIPLE, "scatter", sigma_turn_rad=updated.scatter))
+        found.append(Finding.of("turn-not-a-multiple", "scatter", sigma_turn_rad=updated.scatter))
     # An error of a turn as large as it may be against a wall, which no other turn and no move contradicts.
     alone = np.sqrt(left_out(rates, calibration)[1]) / rates.unit > SLACK_RAD
     if np.any(alone):
-        found.append(Finding.of(FindingCode.TURN_UNCHECKED, axes=sorted(set(turns.axes[alone].tolist()))))
+        found.append(Finding.of("turn-unchecked", axes=sorted(set(turns.axes[alone].tolist()))))
     rms = rms_of(missed[is_used])
-    found.append(Finding.of(FindingCode.TURNTABLE, "turns", turns=int(np.count_nonzero(is_used)), rms_rad=rms))
+    found.append(Finding.of("turntable", "turns", turns=int(np.count_nonzero(is_used)), rms_rad=rms))
     if np.all(is_reversed):
-        found.append(Finding.of(FindingCode.LEFT_HANDED, "turns-against-moves", turns=len(angles)))
+        found.append(Finding.of("left-handed", "turns-against-moves", turns=len(angles)))
     after = moved_to(calibration, updated.values, updated.covariance, recording, segments)
     return replace(after, findings=(*calibration.findings, *found)), turns.of(is_used)
 

@@ -20,7 +20,7 @@ from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried_by, move_quality, without_g_sensitivity
 from trihedron.probability import FALSE_ALARM, fdtrc
 from trihedron.ranges import ranges_of
-from trihedron.records import Calibration, Finding, FindingCode, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.checked import number_of
 from trihedron.sensor_model import norms
 from trihedron.session.noise import NOISE_DOF
@@ -271,18 +271,18 @@ def _speeds(spans: list[tuple[int, int]], speeds_deg_s: Sequence[float], rate_hz
 def not_fitted(rates: StatedRates, updated: Updated, *, is_turned: bool) -> Finding:
     """Finding on rates that the update leaves off by more than noise: it did not converge."""
     rms = rms_of(updated.left / rates.speeds)
-    return Finding.of(FindingCode.TURNTABLE, "not-fitted", turns=len(rates.speeds), is_turned=is_turned, rms=rms)
+    return Finding.of("turntable", "not-fitted", turns=len(rates.speeds), is_turned=is_turned, rms=rms)
 
 
 def _said(rates: StatedRates, updated: Updated, seen: FloatArray) -> Finding:
     """Finding on the speeds, of which moves and poses give ``seen`` (k,) [rad/s]."""
     turns, rms = len(seen), rms_of(updated.left / rates.speeds)
     if updated.scatter == 0.0:
-        return Finding.of(FindingCode.TURNTABLE, turns=turns, rms_percent=100.0 * rms)
+        return Finding.of("turntable", turns=turns, rms_percent=100.0 * rms)
     off = seen / rates.speeds - 1.0
     worst = int(np.argmax(np.abs(off)))
     return Finding.of(
-        FindingCode.TURNTABLE,
+        "turntable",
         "contradicting",
         turns=turns,
         seen_rad_s=seen[worst],

@@ -19,7 +19,7 @@ from trihedron.estimate.kalman.per_axis import (
     noise_per_axis,
     shaping_model,
 )
-from trihedron.records import AxisNoise, Finding, FindingCode, NormKalmanCalibration, SensorCalibration
+from trihedron.records import AxisNoise, Finding, NormKalmanCalibration, SensorCalibration
 
 START_RELATIVE, START_BIAS_M_S2 = 0.3, 3.0
 """Standard uncertainty of the initial S, relative to its size, and of the bias, by the range of the readings."""
@@ -83,7 +83,7 @@ def calibrate_without_references(
     seen = check_innovations(innovation, innovation_sigma, N_PARAMETERS)
     findings: list[Finding] = []
     if n_runs is None:
-        findings.append(Finding.of(FindingCode.NOT_CONVERGED, "kalman", most_runs=MOST_RUNS))
+        findings.append(Finding.of("not-converged", "kalman", most_runs=MOST_RUNS))
     findings += consistency_findings(None, seen)
     accelerometer = SensorCalibration(
         S, b, covariance_scale(seen) * covariance, raw_unit, "m/s^2", "kalman, norm of gravity"

@@ -12,7 +12,7 @@ from trihedron.errors import InputError
 from trihedron.probability import FALSE_ALARM, chdtrc, chdtri, ndtri
 from trihedron.records import AxisKalmanResult, AxisNoise, Consistency, ConstantsTrack, KalmanCalibration, PoseTable
 from trihedron.records.calibration import Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.finding import Finding
 from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 
@@ -95,10 +95,10 @@ def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Findin
     case, name = ("norm", "") if axis is None else ("axis", AXES[axis])
     mean, low, high = seen.nis_mean, seen.nis_low, seen.nis_high
     if seen.n == 0:
-        yield Finding.of(FindingCode.FEW_POSES, "untested", poses=9 if axis is None else 4)
+        yield Finding.of("few-poses", "untested", poses=9 if axis is None else 4)
     if seen.n and mean > high:
         yield Finding.of(
-            FindingCode.INNOVATIONS_TOO_LARGE,
+            "innovations-too-large",
             case,
             axis=name,
             nis_mean=mean,
@@ -109,10 +109,10 @@ def consistency_findings(axis: int | None, seen: Consistency) -> Iterator[Findin
             first_pose=seen.first_beyond,
         )
     elif seen.n and mean < low:
-        yield Finding.of(FindingCode.INNOVATIONS_TOO_SMALL, case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)
+        yield Finding.of("innovations-too-small", case, axis=name, nis_mean=mean, nis_low=low, nis_high=high)
     if seen.n_lags and seen.whiteness_p < 1.0 - CONFIDENCE:
         yield Finding.of(
-            FindingCode.INNOVATIONS_CORRELATED,
+            "innovations-correlated",
             case,
             axis=name,
             whiteness_p=seen.whiteness_p,
@@ -276,7 +276,7 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     if condition <= 30.0:
         return observability, []
     weak = Finding.of(
-        FindingCode.WEAKLY_OBSERVABLE,
+        "weakly-observable",
         "kalman-sensitivity" if axis else "kalman-bias",
         axis=axis,
         condition=condition,

@@ -16,7 +16,6 @@ from trihedron.estimate.kalman.per_axis import calibrate_with_references
 from trihedron.records import (
     AxisNoise,
     Finding,
-    FindingCode,
     KalmanCalibration,
     NormKalmanCalibration,
     Observability,
@@ -122,7 +121,7 @@ def _noise(
     white = np.array([one.white for one in assumed])
     # The variance of each mean beyond white noise, from the segmentation, is added.
     extra = np.maximum(poses.sigma_mean**2 - white**2 / poses.pose_s[:, None], 0.0)
-    finding = Finding.of(FindingCode.NOISE_ASSUMED)
+    finding = Finding.of("noise-assumed")
     return assumed, extra, (finding,)
 
 
@@ -186,12 +185,12 @@ def _observed(
     sigma = sensor.quality.sigma / gravity_m_s2
     design = PoseDesign.of(directions_of(correct(poses.mean, sensor.S, sensor.b)), sigma)
     observability = design.observability(float(np.median(sigma)))
-    outliers = [finding for finding in seen if finding.code is FindingCode.OUTLIER_POSE]
+    outliers = [finding for finding in seen if finding.code == "outlier-pose"]
     weak = observability_findings(
         design,
         float(np.median(sigma)),
         observability.advice,
-        is_anchored=any(finding.code is FindingCode.NOT_OBSERVABLE for finding in seen),
+        is_anchored=any(finding.code == "not-observable" for finding in seen),
         anchor=START_RELATIVE,
         are_faces=are_six_faces(poses.mean),
     )

@@ -17,7 +17,7 @@ from trihedron.estimate.noise.axis import blank_axis, longest_tau_s, stated
 from trihedron.estimate.noise.binned import BinnedSpectrum, Model
 from trihedron.estimate.noise.remarks import about_terms
 from trihedron.estimate.noise.screening import Readout
-from trihedron.records import AllanCurve, Finding, FindingCode, Noise, NoiseAxis
+from trihedron.records import AllanCurve, Finding, Noise, NoiseAxis
 from trihedron.records.noise import allan_of_unit_terms
 
 FEWEST_POINTS = 6
@@ -74,7 +74,7 @@ def identify_curve(
     terms = np.repeat((n_samples - 2 * clusters + 1)[:, np.newaxis], sigma.shape[1], axis=1)
     named, weight = (tuple(names), tuple(units)), terms.astype(np.float64)
     curve = curve_with_intervals("overlapping", rate_hz, n_samples, clusters, sigma**2, terms, weight, 0.95, *named)
-    alone = Finding.of(FindingCode.CURVE_ALONE)
+    alone = Finding.of("curve-alone")
     return Noise(tuple(_axis(curve, c) for c in range(sigma.shape[1])), curve, source, findings=(alone,))
 
 
@@ -90,9 +90,7 @@ def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
     if left:
         last = -1 - min(MARGIN, len(points.count) - FEWEST_POINTS)
         points = points.below(points.frequency_hz[last])
-        findings.append(
-            Finding.of(FindingCode.SPECTRUM_LOW_PASS, "curve", first_s=0.5 / float(points.frequency_hz[-1]))
-        )
+        findings.append(Finding.of("spectrum-low-pass", "curve", first_s=0.5 / float(points.frequency_hz[-1])))
     sample_sigma = float(curve.deviation[0, channel] * np.sqrt(curve.clusters[0]))
     written, n = Readout(0.0, sample_sigma, 0.0, 0.0), curve.n_samples
     blank = blank_axis(curve.names[channel], curve.units[channel], curve.rate_hz, n, np.nan, written)

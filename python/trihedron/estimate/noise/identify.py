@@ -38,7 +38,7 @@ from trihedron.estimate.noise.slow_changes import (
 from trihedron.estimate.noise.spectrum import ordinates, ordinates_of_means
 from trihedron.estimate.noise.two_levels import two_levels
 from trihedron.ranges import merged
-from trihedron.records import AllanCurve, Finding, FindingCode
+from trihedron.records import AllanCurve, Finding
 from trihedron.records.noise import FEWEST_READINGS, Noise, NoiseAxis
 
 ACCELEROMETER = ("accel x", "accel y", "accel z")
@@ -116,7 +116,7 @@ def identify_noise(
     findings: list[Finding] = []
     repeated = repeated_rows(readings)
     if repeated > 0.001:
-        findings.append(Finding.of(FindingCode.REPEATED_ROWS, "static", share=repeated))
+        findings.append(Finding.of("repeated-rows", "static", share=repeated))
 
     def undisturbed(c: int) -> Channel:
         one = Channel(np.array(readings[:, c], dtype=np.float64), rate_hz, names[c], units[c])
@@ -135,9 +135,7 @@ def identify_noise(
             seen = list(pool.map(lambda one: one.without_changes(heat), seen))
         if cuts:
             total = sum(b - a for a, b in cuts)
-            said = Finding.of(
-                FindingCode.STRETCHES_EXCLUDED, n_stretches=len(cuts), excluded_s=total / rate_hz, share=total / n
-            )
+            said = Finding.of("stretches-excluded", n_stretches=len(cuts), excluded_s=total / rate_hz, share=total / n)
             findings.append(said)
         findings += [*_motion(seen, rate_hz), *_heated(seen, heat), *_switching(seen, pool)]
         curve = curve_of([one.column[:, np.newaxis] for one in seen], rate_hz, clusters, names, units)
@@ -201,7 +199,7 @@ class Channel:
         share = sum(stop - start for start, stop in cuts) / len(self.column)
         if share > MOST_DISTURBED:
             # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
-            findings.append(Finding.of(FindingCode.LOG_MOTION, "throughout", share=share))
+            findings.append(Finding.of("log-motion", "throughout", share=share))
             steps, cuts = [], []
         return replace(self, steps=steps, cuts=cuts, findings=findings)
 
@@ -241,7 +239,7 @@ class Channel:
         tails = tail_error(self.column if self.head is None else self.head)
         axis = identify_axis(choices, blank, curve, channel, tails, range_degc)
         # Drift that the temperature explains is stated with it.
-        others = tuple(one for one in axis.findings if one.code is not FindingCode.LOG_DRIFT)
+        others = tuple(one for one in axis.findings if one.code != "log-drift")
         return replace(axis, findings=others) if self.is_heated else axis
 
 
@@ -272,13 +270,13 @@ def _motion(seen: Sequence[Channel], rate_hz: float) -> list[Finding]:
     force = np.column_stack(triad)
     turn = turn_of_gravity(force, rate_hz)
     if turn is not None:
-        return [Finding.of(FindingCode.LOG_MOTION, "turns", turn_rad=turn[0], every_s=turn[1])]
+        return [Finding.of("log-motion", "turns", turn_rad=turn[0], every_s=turn[1])]
     other = other_orientation(force, rate_hz)
     if other is None:
         return []
     turn_rad, start, stop = other
     said = Finding.of(
-        FindingCode.LOG_TURNED, turn_rad=turn_rad, start_s=start / rate_hz, stop_s=stop / rate_hz, is_first=start == 0,
+        "log-turned", turn_rad=turn_rad, start_s=start / rate_hz, stop_s=stop / rate_hz, is_first=start == 0,
         is_last=stop == len(force),
     )  # fmt: skip
     return [said]
@@ -291,9 +289,7 @@ def _heated(seen: Sequence[Channel], heat: FloatArray | None) -> list[Finding]:
         return []
     used = heat[np.isfinite([one.column for one in seen]).any(axis=0)]
     share = max(one.share_of_heat for one in seen)
-    said = Finding.of(
-        FindingCode.TEMPERATURE_DRIVEN, "noise", low_degc=used.min(), high_degc=used.max(), share=share, axes=axes
-    )
+    said = Finding.of("temperature-driven", "noise", low_degc=used.min(), high_degc=used.max(), share=share, axes=axes)
     return [said]
 
 
@@ -305,7 +301,7 @@ def _switching(seen: Sequence[Channel], pool: ThreadPoolExecutor) -> list[Findin
         for one, levels in zip(seen, found, strict=True)
         if levels is not None
     ]
-    return [Finding.of(FindingCode.TWO_LEVELS, axes=axes)] if axes else []
+    return [Finding.of("two-levels", axes=axes)] if axes else []
 
 
 def _checked_stretch(stretch: tuple[float, float], n: int, rate_hz: float) -> tuple[int, int]:

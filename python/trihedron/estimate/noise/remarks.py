@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from trihedron.records import Finding, FindingCode, NoiseAxis, SpectralLine, TermName
+from trihedron.records import Finding, NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
     from trihedron.arrays import FloatArray
@@ -25,37 +25,33 @@ def events(
     """Findings for steps, impacts and shaking of one axis; the largest step and impact with their times."""
     if steps:
         worst = max(steps, key=lambda e: abs(e.size))
-        yield Finding.of(
-            FindingCode.LOG_JUMP, n_steps=len(steps), step=worst.size, unit=unit, time_s=worst.start / rate_hz
-        )
+        yield Finding.of("log-jump", n_steps=len(steps), step=worst.size, unit=unit, time_s=worst.start / rate_hz)
     if impacts:
         worst = max(impacts, key=lambda e: abs(e.size))
         yield Finding.of(
-            FindingCode.LOG_IMPACT, n_impacts=len(impacts), impact=worst.size, unit=unit, time_s=worst.start / rate_hz
+            "log-impact", n_impacts=len(impacts), impact=worst.size, unit=unit, time_s=worst.start / rate_hz
         )
     if shocks:
         total = sum(e.stop - e.start for e in shocks) / rate_hz
         yield Finding.of(
-            FindingCode.LOG_MOTION, shaken_s=total, times=max(e.size for e in shocks), first_s=shocks[0].start / rate_hz
+            "log-motion", shaken_s=total, times=max(e.size for e in shocks), first_s=shocks[0].start / rate_hz
         )
 
 
 def of_readout(readings: Readout, unit: str) -> Iterator[Finding]:
     """Findings for readings at the range limit, and for noise that is too small for the resolution of the ADC."""
     if readings.clipped > 0.0:
-        yield Finding.of(FindingCode.CLIPPING, "static", share=readings.clipped)
+        yield Finding.of("clipping", "static", share=readings.clipped)
     if readings.sigma == 0.0 or readings.is_dead:
         sigma, resolution, repeated = readings.sigma, readings.resolution, readings.repeated
-        yield Finding.of(
-            FindingCode.QUANTISATION_DEAD, sigma=sigma, resolution=resolution, unit=unit, repeated=repeated
-        )
+        yield Finding.of("quantisation-dead", sigma=sigma, resolution=resolution, unit=unit, repeated=repeated)
 
 
 def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
     """Finding for spectral lines, the strongest first."""
     strong = sorted(found, key=lambda line: -line.amplitude)
     return Finding.of(
-        FindingCode.SPECTRAL_LINE,
+        "spectral-line",
         n_lines=len(strong),
         strongest=[(line.frequency_hz, line.amplitude, unit) for line in strong[:NAMED]],
         has_more=len(strong) > NAMED,
@@ -68,9 +64,9 @@ def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
 def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding:
     """Finding for an upper end of the spectrum that no sum of noise terms explains (low-pass filtering)."""
     if math.isnan(at_nyquist):
-        return Finding.of(FindingCode.SPECTRUM_LOW_PASS, "throughout")
+        return Finding.of("spectrum-low-pass", "throughout")
     return Finding.of(
-        FindingCode.SPECTRUM_LOW_PASS,
+        "spectrum-low-pass",
         "falls" if at_nyquist < 1.0 else "rises",
         highest_hz=highest_hz,
         nyquist_hz=nyquist_hz,
@@ -81,7 +77,7 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
 def unexplained(deviation: float, frequency_hz: float) -> Finding:
     """Finding for a part of the spectrum that the terms do not explain."""
     tau_s = 0.5 / frequency_hz
-    return Finding.of(FindingCode.SPECTRUM_UNEXPLAINED, deviation=deviation, frequency_hz=frequency_hz, tau_s=tau_s)
+    return Finding.of("spectrum-unexplained", deviation=deviation, frequency_hz=frequency_hz, tau_s=tau_s)
 
 
 def changes(found: Sequence[SlowChange], unit: str, heat: FloatArray | None = None) -> Iterator[Finding]:
@@ -89,10 +85,10 @@ def changes(found: Sequence[SlowChange], unit: str, heat: FloatArray | None = No
     low_degc, high_degc = UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))
     for one in found:
         if one.is_wave:
-            yield Finding.of(FindingCode.LOG_DRIFT, "wave", period_s=one.time_s, amplitude=one.size, unit=unit)
+            yield Finding.of("log-drift", "wave", period_s=one.time_s, amplitude=one.size, unit=unit)
             continue
         yield Finding.of(
-            FindingCode.LOG_DRIFT,
+            "log-drift",
             "warm-up",
             drift=one.size,
             time_s=one.time_s,
@@ -109,7 +105,7 @@ def about_terms(axis: NoiseAxis, range_degc: tuple[float, float] = UNLOGGED) -> 
     ramp, flicker, walk = terms[TermName.RATE_RAMP], terms[TermName.BIAS_INSTABILITY], terms[TermName.RATE_RANDOM_WALK]
     if ramp.is_present:
         yield Finding.of(
-            FindingCode.LOG_DRIFT,
+            "log-drift",
             drift=ramp.value * axis.duration_s,
             slope=ramp.value,
             sigma_slope=ramp.sigma,
@@ -120,7 +116,7 @@ def about_terms(axis: NoiseAxis, range_degc: tuple[float, float] = UNLOGGED) -> 
         )
     if axis.is_slow_noise_unresolved:
         yield Finding.of(
-            FindingCode.SLOW_NOISE_UNRESOLVED,
+            "slow-noise-unresolved",
             evidence=axis.slow_pair.evidence if axis.slow_pair is not None else 0.0,
             unit=axis.unit,
             flicker_lower=flicker.lower,
@@ -129,4 +125,4 @@ def about_terms(axis: NoiseAxis, range_degc: tuple[float, float] = UNLOGGED) -> 
             walk_upper=walk.upper,
         )
     if not walk.is_present and axis.optimal_averaging() is None:
-        yield Finding.of(FindingCode.LOG_TOO_SHORT, limit=walk.limit, unit=axis.unit)
+        yield Finding.of("log-too-short", limit=walk.limit, unit=axis.unit)

@@ -12,7 +12,7 @@ from trihedron.estimate.reference.slip import Slip
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import chdtri
 from trihedron.ranges import edges_of
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceError, Sign
 from trihedron.sensor_model import reframing
 
@@ -135,13 +135,13 @@ def remarks(result: AgainstReference, is_turned: bool, slip: Slip | None) -> Ite
     """Findings of a fit: independence of the reference, direction of up, outliers, slip or deviations, misfit."""
     error = result.error
     if is_turned:
-        yield Finding.of(FindingCode.REFERENCE_TURNED_ROUND)
+        yield Finding.of("reference-turned-round")
     if result.vertical is not None and (up := result.vertical.value)[2] < -UPRIGHT:
-        yield Finding.of(FindingCode.REFERENCE_UPSIDE_DOWN, up_x=up[0], up_y=up[1], up_z=up[2])
+        yield Finding.of("reference-upside-down", up_x=up[0], up_y=up[1], up_z=up[2])
     if error.signs:
         seen = {sign.kind: sign.seen for sign in error.signs}
         yield Finding.of(
-            FindingCode.REFERENCE_NOT_INDEPENDENT,
+            "reference-not-independent",
             is_quiet="quieter-than-gyro" in seen,
             is_square="mounted-without-error" in seen,
             angle_rad=seen.get("mounted-without-error", float("nan")),
@@ -149,21 +149,21 @@ def remarks(result: AgainstReference, is_turned: bool, slip: Slip | None) -> Ite
     yield from of_error(error, slip)
     force = result.accelerometer
     if force is not None and force.widened > COLOURED:
-        yield Finding.of(FindingCode.REFERENCE_MISFIT, sensor="accelerometer", widened=force.widened)
+        yield Finding.of("reference-misfit", sensor="accelerometer", widened=force.widened)
 
 
 def of_error(error: ReferenceError, slip: Slip | None, *, is_of_noise: bool = False) -> Iterator[Finding]:
     """Findings of the reference alone: outliers, and a slip or deviating intervals; white noise contains no slip."""
     if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
         rows = error.rows + error.rows_left_out
-        yield Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=error.rows_left_out, rows=rows)
+        yield Finding.of("reference-outliers", left_out=error.rows_left_out, rows=rows)
     if slip is not None:
         yield Finding.of(
-            FindingCode.REFERENCE_APART,
+            "reference-apart",
             "slipped-in-noise" if is_of_noise else "slipped",
             at_s=slip.at_s,
             angle_rad=slip.angle_rad,
             sigma_rad=slip.sigma_rad,
         )
     elif apart := error.apart_s:
-        yield Finding.of(FindingCode.REFERENCE_APART, start_s=apart[0][0], end_s=apart[-1][1], n=len(apart))
+        yield Finding.of("reference-apart", start_s=apart[0][0], end_s=apart[-1][1], n=len(apart))

@@ -16,7 +16,7 @@ from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.observed import Observed
-from trihedron.records import Calibration, FindingCode, FitQuality, Segments
+from trihedron.records import Calibration, FitQuality, Segments
 from trihedron.sensor_model import in_frame, norms
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
@@ -195,7 +195,7 @@ def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurem
 
 def without_g_sensitivity(measured: MoveMeasurements, own: Calibration | None) -> MoveMeasurements:
     """The moves without the g-sensitivity that the ``own`` calibration of their recording shows, if any."""
-    shown = [] if own is None else [one for one in own.findings if one.code is FindingCode.GYRO_G_SENSITIVITY]
+    shown = [] if own is None else [one for one in own.findings if one.code == "gyro-g-sensitivity"]
     if own is None or own.gyroscope is None or not shown:
         return measured
     lower = in_frame(own, "lower")

@@ -21,7 +21,7 @@ from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted,
 from trihedron.estimate.session.observed import Near
 from trihedron.estimate.session.start import Log, begun, is_enough, near_one_another
 from trihedron.probability import FALSE_ALARM, chdtri, fdtrc
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.session.noise import NOISE_DOF
 
 
@@ -230,7 +230,7 @@ def calibrate_joint(
     quality = norm_quality(solution, None if left_out is None else (left_out.norm, left_out.norm_sigma))
     has_temperature = recording.temperature_degc is not None
     of_residual = residual_findings(quality.chi2, quality, *solution.accel_bias_change, has_temperature=has_temperature)
-    still = [finding for finding in alone.findings if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE]
+    still = [finding for finding in alone.findings if finding.code != "residual-above-noise"]
     return replace(
         alone,
         accelerometer=replace(

@@ -60,7 +60,7 @@ def _beside(found: FilterNoise) -> Sequence[str]:
             out.append(f"{word}{one.sensor}: N {_said(N)} {units[0]}, K {_said(K)} {units[1]}")
         if one.axes_N:
             out.append(f"{one.sensor} N of X, Y, Z: {', '.join(_said(axis) for axis in one.axes_N)}")
-    warned = (f for f in found.findings if f.severity is Severity.WARNING and f.code.value.startswith("filter-noise"))
+    warned = (f for f in found.findings if f.severity is Severity.WARNING and f.code.startswith("filter-noise"))
     out += [f"warning: {f.seen} {f.action}".replace("\N{MINUS SIGN}", "-") for f in warned]
     return out
 

@@ -21,7 +21,7 @@ from trihedron.ranges import edges_of
 from trihedron.read.audit.readings import short
 from trihedron.read.audit.repeats import Repeats, copied_rows, longest_by_chance
 from trihedron.read.sensors import Sensors
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 
 LONG, HALF = 0.1, 0.5
 """Shares of a log that are invalid, from which on the finding is serious, and nothing is excluded."""
@@ -66,7 +66,7 @@ def _invalid(case: str, rows: list[BoolArray], sensors: Sensors) -> Finding:
     every = np.any(rows, axis=0)
     of_each = zip(sensors.triads, rows, strict=True)
     return Finding.of(
-        FindingCode.INVALID_READINGS,
+        "invalid-readings",
         case,
         severity=Severity.WARNING if every.mean() < LONG else Severity.SERIOUS,
         counts=[(short(sensor), int(one.sum())) for sensor, one in of_each if one.any()],
@@ -232,7 +232,7 @@ def _stuck_finding(sensor: str, k: int, readings: FloatArray, runs: IntArray, se
     length = runs[:, 1] - runs[:, 0]
     first = int(runs[length.argmax(), 0])
     return Finding.of(
-        FindingCode.STUCK_VALUES,
+        "stuck-values",
         severity=Severity.WARNING if length.sum() < LONG * len(readings) else Severity.SERIOUS,
         sensor=short(sensor),
         is_triad=k == 3,

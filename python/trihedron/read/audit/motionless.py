@@ -5,7 +5,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray, rms_of
 from trihedron.channel_facts.quiet import Windows
 from trihedron.quantiles import quantile
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 FEWEST = 12
 """Fewest quiet windows, half a second each, in which a motionless accelerometer axis is found."""
@@ -50,7 +50,7 @@ def _off_circle(points: FloatArray) -> float:
 
 def _finding(sensor: str, k: int, without: str) -> Finding:
     return Finding.of(
-        FindingCode.STUCK_VALUES,
+        "stuck-values",
         "motionless",
         sensor=sensor,
         axis_name=AXES[k],

@@ -18,7 +18,7 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.probability import LN_FAULT, MEDIAN_CHI2
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 GYRO_RATIOS = (1.0, 2.0, 4.0, 8.0, 180.0 / math.pi)
 FORCE_RATIOS = (1.0, 2.0, 4.0, 8.0, 9.80665)
@@ -79,7 +79,7 @@ def _finding(sensor: str, change: Change, sensors: Sensors) -> Finding:
     axes, ratio = change.axes, change.ratio
     if not axes:
         return Finding.of(
-            FindingCode.AXES_CHANGED,
+            "axes-changed",
             "range",
             sensor=sensor,
             from_s=from_s,
@@ -93,7 +93,7 @@ def _finding(sensor: str, change: Change, sensors: Sensors) -> Finding:
     if others and len(others) < len(axes):
         sensor, axes, other, others = other, others, sensor, axes
     return Finding.of(
-        FindingCode.AXES_CHANGED,
+        "axes-changed",
         sensor=sensor,
         from_s=from_s,
         to_s=to_s,

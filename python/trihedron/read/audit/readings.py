@@ -11,7 +11,7 @@ from trihedron.channel_facts.quiet import Windows
 from trihedron.read.audit.repeats import Repeats
 from trihedron.read.clock.rate import usual_step
 from trihedron.read.turning import Turning
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.records.channel_facts import ChannelFacts, Limit
 from trihedron.records.words import Words
 
@@ -45,7 +45,7 @@ def _clipped(sensor: str, limits: list[Limit], place: Place, *, is_static: bool)
     numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in limits}
     numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in limits}
     return Finding.of(
-        FindingCode.CLIPPING,
+        "clipping",
         is_static=is_static,
         sensor=short(sensor),
         is_gyro=sensor == "gyroscope",
@@ -84,7 +84,7 @@ def _non_finite(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
         return []
     return [
         Finding.of(
-            FindingCode.NON_FINITE,
+            "non-finite",
             "readings",
             severity=Severity.WARNING if count < MANY * repeats.n else Severity.SERIOUS,
             sensor=short(sensor),
@@ -108,7 +108,7 @@ def _repeated(sensor: str, readings: FloatArray, repeats: Repeats, place: Place)
     longest = int(repeats.longest[3])
     return [
         Finding.of(
-            FindingCode.REPEATED_ROWS,
+            "repeated-rows",
             severity=Severity.WARNING if seen < HALF else Severity.SERIOUS,
             sensor=short(sensor),
             count=int(repeats.count[3]),
@@ -146,7 +146,7 @@ def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Fin
     if not axes:
         return []
     numbers = {f"{name}_step": step for name, step, _ in axes}
-    return [Finding.of(FindingCode.COARSE_RESOLUTION, sensor=short(sensor), axes=axes, numbers=numbers)]
+    return [Finding.of("coarse-resolution", sensor=short(sensor), axes=axes, numbers=numbers)]
 
 
 # Gravity that rotates between two samples without a gyro rate: both sensors' axes changed, or rows are cut.
@@ -193,7 +193,7 @@ def audit_seam(
     ]
     if not leaps:
         return []
-    return [Finding.of(FindingCode.AXES_CHANGED, "leap", count=len(leaps), where=place(leaps[0]), sample=leaps[0])]
+    return [Finding.of("axes-changed", "leap", count=len(leaps), where=place(leaps[0]), sample=leaps[0])]
 
 
 def _leaps(readings: FloatArray, least: float) -> list[int]:

@@ -10,7 +10,7 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, steps_of_counter, usual_step
 from trihedron.read.sensors import Sensors
 from trihedron.read.turning import turning_of
-from trihedron.records import Finding, FindingCode, Severity, TimestampKind
+from trihedron.records import Finding, Severity, TimestampKind
 from trihedron.records.words import Words
 
 Place = Callable[[int], Words]
@@ -51,9 +51,7 @@ def audit_pace(sensors: Sensors) -> list[Finding]:
                 return []
             decided = may_lie and not may_be_true
     return [
-        Finding.of(
-            FindingCode.CLOCK_JUMPED, percent=100.0 * (ratio - 1.0), where=sensors.place(at), sample=at, decided=decided
-        )
+        Finding.of("clock-jumped", percent=100.0 * (ratio - 1.0), where=sensors.place(at), sample=at, decided=decided)
     ]
 
 
@@ -117,7 +115,7 @@ def audit_timing(sensors: Sensors, rate_hz: float) -> list[Finding]:
         is_note = jitter < MUCH_JITTER * mean or logged_s is not time_s
         findings.append(
             Finding.of(
-                FindingCode.TIME_JITTER,
+                "time-jitter",
                 severity=Severity.NOTE if is_note else Severity.WARNING,
                 jitter_s=jitter,
                 median_step_s=usual,
@@ -156,7 +154,7 @@ def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Find
     fraction = len(same) / len(step)
     return [
         Finding.of(
-            FindingCode.TIME_DUPLICATE,
+            "time-duplicate",
             severity=Severity.NOTE if is_mended else Severity.WARNING,
             is_mended=is_mended,
             count=len(same),
@@ -176,7 +174,7 @@ def _gap(step: FloatArray, lost: IntArray, place: Place) -> Finding:
     others = total - int(lost[longest])
     worst = sorted(gaps[np.argsort(step[gaps])[::-1][:3]].tolist())
     return Finding.of(
-        FindingCode.TIME_GAP,
+        "time-gap",
         severity=Severity.SERIOUS if others > SERIOUS_LOSS * (len(step) + 1 + others) else Severity.WARNING,
         count=len(gaps),
         lost_samples=total,
@@ -203,7 +201,7 @@ def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding
     missing = int(np.sum(np.rint(step[lost] / usual) - 1))
     return [
         Finding.of(
-            FindingCode.SAMPLES_LOST,
+            "samples-lost",
             "counter",
             severity=Severity.WARNING if missing <= SERIOUS_LOSS * len(counter) else Severity.SERIOUS,
             column=label,

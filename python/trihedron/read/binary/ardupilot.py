@@ -14,7 +14,7 @@ from trihedron.read.errors import errors_of_library, file_sha256, stderr_without
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Options, StatedClock, Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 STARTS = (b"\xa3\x95",)
 _PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
@@ -82,7 +82,7 @@ def _skipped(said: str) -> tuple[Finding, ...]:
     skips = [int(n) for n in re.findall(r"Skipped (\d+) bad bytes", said)]
     if not skips:
         return ()
-    return (Finding.of(FindingCode.SAMPLES_LOST, "bytes-skipped", bytes=sum(skips), count=len(skips)),)
+    return (Finding.of("samples-lost", "bytes-skipped", bytes=sum(skips), count=len(skips)),)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError, errors_of_polars, file_sha256, reject_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Options, Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 
 STARTS = (b"PAR1",)
 
@@ -35,7 +35,7 @@ def read(path: Path, _options: Options) -> tuple[Table, ...]:
             columns.append(np.asarray(series.cast(pl.Float64).to_numpy(), dtype=np.float64))
             names.append(name)
         else:
-            findings.append(Finding.of(FindingCode.COLUMN_LEFT_OUT, "type", column=name, kind=str(series.dtype)))
+            findings.append(Finding.of("column-left-out", "type", column=name, kind=str(series.dtype)))
     if not columns or n_rows == 0:
         raise ReadError(f"{path}: the table has no rows of numbers; write it again.")
     return (Table(path, tuple(names), tuple(columns), file_sha256(path), findings=tuple(findings)),)

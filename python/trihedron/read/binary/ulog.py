@@ -21,7 +21,7 @@ from trihedron.read.errors import ReadError, errors_of_library, file_sha256
 from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Options, StatedClock, Table
-from trihedron.records import Finding, FindingCode, Onboard
+from trihedron.records import Finding, Onboard
 from trihedron.records.onboard import Stage
 
 STARTS = (b"ULog",)
@@ -178,8 +178,8 @@ def _timestamp(data: dict[str, Any]) -> str:
 
 
 def _losses(log: Any) -> tuple[Finding, ...]:
-    out = [Finding.of(FindingCode.SAMPLES_LOST, "damaged")] if log.file_corruption else []
+    out = [Finding.of("samples-lost", "damaged")] if log.file_corruption else []
     if log.dropouts:
         lost_s = sum(drop.duration for drop in log.dropouts) / 1e3
-        out.append(Finding.of(FindingCode.SAMPLES_LOST, "dropouts", count=len(log.dropouts), lost_s=lost_s))
+        out.append(Finding.of("samples-lost", "dropouts", count=len(log.dropouts), lost_s=lost_s))
     return tuple(out)

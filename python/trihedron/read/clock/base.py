@@ -11,7 +11,7 @@ from trihedron.read.clock.rate import RESET, modulus_of, steps_of, usual_step
 from trihedron.read.clock.unit import Witness, seconds_of, time_unit
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.words import Words
 
 _SHORTEST_STEP_S = 1e-9
@@ -68,7 +68,7 @@ def build_clock(
         count = np.count_nonzero(~finite)
         findings.append(
             Finding.of(
-                FindingCode.NON_FINITE,
+                "non-finite",
                 "time",
                 count=count,
                 where=table.place(bad),
@@ -136,7 +136,7 @@ def unwrap(
     turns[back + 1] = modulus
     findings.append(
         Finding.of(
-            FindingCode.TIME_WRAPPED,
+            "time-wrapped",
             modulus=modulus,
             count=len(back),
             where=_place(table, rows, int(back[0]) + 1),
@@ -166,7 +166,7 @@ def never_set_back(
     lifts[back + 1] = usual - step[back]
     findings.append(
         Finding.of(
-            FindingCode.TIME_BACKWARD,
+            "time-backward",
             "set",
             count=len(back),
             where=_place(table, rows, int(back[0]) + 1),
@@ -223,7 +223,5 @@ def order_of_rows(
             f"{_place(table, rows, int(back[np.argmin(step)]) + 1)}: two recordings in one file, or a clock that "
             "was set; cut the file there."
         )
-    findings.append(
-        Finding.of(FindingCode.TIME_BACKWARD, count=len(back), where=place, displaced_rows=displaced, sample=first)
-    )
+    findings.append(Finding.of("time-backward", count=len(back), where=place, displaced_rows=displaced, sample=first))
     return order

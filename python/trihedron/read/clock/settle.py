@@ -7,7 +7,7 @@ import numpy as np
 from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
 from trihedron.read.clock.rate import steps_of, steps_of_counter
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.sampling import Sampling, TimestampKind
 
 CONTRAST = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
@@ -202,11 +202,7 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
     follows, ignores = _decided(sampling.followed, sampling.sigma_followed)
     return (
         Finding.of(
-            FindingCode.EVEN_CLOCK
-            if sampling.is_even
-            else FindingCode.TIMESTAMPS_KEPT
-            if follows and not ignores
-            else FindingCode.CLOCK_UNDECIDED,
+            "even-clock" if sampling.is_even else "timestamps-kept" if follows and not ignores else "clock-undecided",
             period_s=sampling.period_s,
             sigma_period_s=sampling.sigma_period_s,
             rate_hz=1.0 / sampling.period_s,

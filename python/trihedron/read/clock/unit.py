@@ -10,7 +10,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.rate import steps_of, usual_step
 from trihedron.read.errors import ReadError
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.records.words import words
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
@@ -136,7 +136,7 @@ def _weigh_given(raw: FloatArray, unit: str, named: str, findings: list[Finding]
     if rate_hz and not PLAUSIBLE_HZ[0] <= rate_hz <= PLAUSIBLE_HZ[1]:
         is_named = bool(named) and named != unit
         said = Finding.of(
-            FindingCode.RATE_CONTRADICTED, "time-unit", unit=unit, rows=len(raw), span_s=span_s, rate_hz=rate_hz,
+            "rate-contradicted", "time-unit", unit=unit, rows=len(raw), span_s=span_s, rate_hz=rate_hz,
             is_named=is_named, named=named if is_named else "s",
         )  # fmt: skip
         findings.append(said)
@@ -177,7 +177,7 @@ def counts_rows(raw: FloatArray) -> bool:
 
 def was_weighed(finding: Finding) -> bool:
     """Whether a finding states that the unit of whole-numbered timestamps was inferred."""
-    return finding.code is FindingCode.TIME_UNIT_DETECTED and "weighed_tick_s" in finding.numbers
+    return finding.code == "time-unit-detected" and "weighed_tick_s" in finding.numbers
 
 
 def with_gyro(findings: list[Finding], is_confirmed: bool) -> list[Finding]:
@@ -185,9 +185,7 @@ def with_gyro(findings: list[Finding], is_confirmed: bool) -> list[Finding]:
     a note where the rotation of gravity confirms it."""
     severity = Severity.NOTE if is_confirmed else Severity.SERIOUS
     return [
-        replace(f, severity=severity)
-        if f.code is FindingCode.TIME_UNIT_DETECTED and f.severity is Severity.WARNING
-        else f
+        replace(f, severity=severity) if f.code == "time-unit-detected" and f.severity is Severity.WARNING else f
         for f in findings
     ]
 
@@ -218,7 +216,7 @@ def _statement(usual: float, choice: str, sure: bool, possible: list[str], tick_
     rate = 1.0 / (usual * SECONDS[choice])
     others = [words("unit-with-rate", unit=u, rate_hz=1.0 / (usual * SECONDS[u])) for u in possible if u != choice]
     return Finding.of(
-        FindingCode.TIME_UNIT_DETECTED,
+        "time-unit-detected",
         "" if sure else "unsure",
         numbers=tick_s,
         step=usual,

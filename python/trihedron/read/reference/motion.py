@@ -16,7 +16,7 @@ from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.source import read_tables
 from trihedron.read.table import Options, Table
-from trihedron.records import Finding, FindingCode, Recording
+from trihedron.records import Finding, Recording
 from trihedron.records.reference import ReferenceMotion
 from trihedron.units import RateUnit, acceleration_to_si, rate_to_si
 
@@ -179,7 +179,7 @@ def _settled(motion: ReferenceMotion, findings: tuple[Finding, ...]) -> Referenc
     time_s, start_s, rate, attitude = motion.time_s, motion.start_epoch_s, motion.rate, motion.attitude
     stepwise = rate is not None and float(np.median(np.diff(time_s))) > LONG_ROW_S
     if stepwise:
-        findings = (*findings, Finding.of(FindingCode.COLUMNS_ASSUMED, "commands", n_rows=len(time_s)))
+        findings = (*findings, Finding.of("columns-assumed", "commands", n_rows=len(time_s)))
     else:
         # Rows of the attitude matrix change with motion as readings do: two of them show when a row was taken.
         triads = [] if attitude is None else [attitude[:, 0], attitude[:, 1]]

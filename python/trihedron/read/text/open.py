@@ -11,7 +11,7 @@ from trihedron.read.text.dialect import Rewritten, rewrite, split_records
 from trihedron.read.text.json_log import is_json, of_json
 from trihedron.read.text.makers import makers
 from trihedron.read.text.reader import TextReader
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding
 from trihedron.records.progress import Progress
 
 _SAMPLE_BYTES = 1 << 17
@@ -50,7 +50,7 @@ def _of_records(path: Path, tables: dict[str, Table], counts: dict[str, int]) ->
     if left < 0:
         raise ReadError(f"{path}: the records of this file cannot be separated; split it by sensor.")
     note = Finding.of(
-        FindingCode.DEVICE_CHOSEN,
+        "device-chosen",
         "records",
         kinds=sorted(counts.items(), key=lambda kv: -kv[1])[:12],
         rows_left_out=left,

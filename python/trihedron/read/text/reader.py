@@ -14,7 +14,7 @@ from trihedron.read.table import Table
 from trihedron.read.text.blocks import Lines, blocks, rows_of
 from trihedron.read.text.cells import TextColumn, numbers, parse, text_column
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.records.progress import Progress
 
 _SAMPLE_BYTES = 1 << 18
@@ -93,7 +93,7 @@ class TextReader:
         n = layout.n_fields
         if layout.header_ignored:
             said = layout.header_ignored[:80]
-            self.findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "header-ignored", line=said, n_columns=n))
+            self.findings.append(Finding.of("columns-assumed", "header-ignored", line=said, n_columns=n))
         if not layout.stray:
             return layout
         first, count = self.line(layout.stray[0]), len(layout.stray)
@@ -103,9 +103,7 @@ class TextReader:
                 f"{self.line(layout.first_line)} on ({n} fields): the separator or the columns change inside the file; "
                 "cut it there and read the parts one by one."
             )
-        self.findings.append(
-            Finding.of(FindingCode.ROWS_LEFT_OUT, "above", rows_left_out=count, n_columns=n, line=first)
-        )
+        self.findings.append(Finding.of("rows-left-out", "above", rows_left_out=count, n_columns=n, line=first))
         return layout
 
     def _plain(self, block: npt.NDArray[np.uint8], layout: Layout, line: int) -> int:
@@ -136,7 +134,7 @@ class TextReader:
             is_half = not block.endswith(b"\n")
             self.findings.append(
                 Finding.of(
-                    FindingCode.LINE_INCOMPLETE,
+                    "line-incomplete",
                     severity=Severity.NOTE if is_half else Severity.WARNING,
                     line=self.line(int(lines[-1])),
                     rows_left_out=1,
@@ -196,7 +194,7 @@ class TextReader:
             raise ReadError(f"{self.path}: the file has a header but no row of numbers; record or copy it again.")
         if self.comments:
             at, count = self.line(self.comments[0]), len(self.comments)
-            self.findings.append(Finding.of(FindingCode.ROWS_LEFT_OUT, "remarks", rows_left_out=count, line=at))
+            self.findings.append(Finding.of("rows-left-out", "remarks", rows_left_out=count, line=at))
         names = [layout.name(i) for i in range(layout.n_fields)]
         columns = [self.blocks[block][: self.n_rows, k] for block, k in self.places]
         has_time = any(parse_name(name).role == "time" for name in names)

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, Severity
 from trihedron.report.document import Document, FindingList, Paragraph
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import finding_in_print
@@ -29,14 +29,8 @@ def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
 
 def by_weight(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Findings, equal ones merged, gravest first."""
-    return tuple(
-        sorted(combined(findings), key=lambda f: (_ORDER[f.severity], f.code is FindingCode.GRAVITY_DEFAULTED))
-    )
-
-
-def _weight(finding: Finding) -> tuple[int, bool]:
     # Gravity that was not given comes after all else that is wrong.
-    return _ORDER[finding.severity], finding.code is FindingCode.GRAVITY_DEFAULTED
+    return tuple(sorted(combined(findings), key=lambda f: (_ORDER[f.severity], f.code == "gravity-defaulted")))
 
 
 def serious_ones(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -49,7 +43,7 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
     ``good``."""
     found = by_weight(findings)
     serious = [one for one in found if one.severity is Severity.SERIOUS]
-    warned = Counter(finding_in_print(one.code.value) for one in found if one.severity is Severity.WARNING)
+    warned = Counter(finding_in_print(one.code) for one in found if one.severity is Severity.WARNING)
     if serious:
         return " ".join(filter(None, (f"{bad}: {capital(opening(serious[0].seen))}.", likely(serious[0].cause))))
     if not warned:
@@ -80,7 +74,7 @@ def combined(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Findings with those that several axes, poses or moves have in common merged into one that lists them."""
     groups: dict[tuple[str, str, str, str], list[Finding]] = {}
     for finding in findings:
-        key = (finding.code.value, finding.severity.value, finding.cause, finding.action)
+        key = (finding.code, finding.severity.value, finding.cause, finding.action)
         groups.setdefault(key, []).append(finding)
     return tuple(
         same[0] if len(same) == 1 else replace(same[0], seen=_together([f.seen for f in same]))

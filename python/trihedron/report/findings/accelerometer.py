@@ -1,6 +1,6 @@
 """Findings about a fitted accelerometer."""
 
-from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Words
 
 _UNQUIET = "Poses not quite static, bias drift between poses, nonlinearity, or noise of the means underestimated"
 _LOOK = (
@@ -15,7 +15,7 @@ _FACES_OR_POSES = (
 _FACES_OR_POSES += "{advice:numbered}."
 
 ENTRIES = {
-    (Code.RESIDUAL_ABOVE_NOISE, "poses", WARNING): Words(
+    ("residual-above-noise", "poses", WARNING): Words(
         "The gravity error in static poses is {rms_m_s2:.3g mm/s²} rms {is_held_out:?cross-validated|in sample}, "
         "{times_noise:.2g} times the noise ({is_held_out:?in sample {rms_in_sample_m_s2:.3g mm/s²}, |}noise alone "
         "{floor_m_s2:.3g mm/s²}, χ²/dof {chi2_per_dof:.3g} with {dof:.0f} degrees of freedom)"
@@ -27,37 +27,37 @@ ENTRIES = {
         + _LOOK
         + "}",
     ),
-    (Code.NOT_OBSERVABLE, "poses-rank", SERIOUS): Words(
+    ("not-observable", "poses-rank", SERIOUS): Words(
         "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; not observable: "
         "{is_combined:?{missing:# combination} of |}{unseen:&, }, constrained by a prior of {anchor:.0f %} about an "
         "ideal triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
         _FACES_OR_POSES,
     ),
-    (Code.NOT_OBSERVABLE, "poses-weak", SERIOUS): Words(
+    ("not-observable", "poses-weak", SERIOUS): Words(
         "The poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
         "gravity; least certain: {weakest}. A prior of {anchor:.0f %} about an ideal triad constrains all parameters.",
         "The orientations are too much alike.",
         _FACES_OR_POSES,
     ),
-    (Code.NOT_OBSERVABLE, "poses-uncertain", SERIOUS): Words(
+    ("not-observable", "poses-uncertain", SERIOUS): Words(
         "The orientations suffice, but the reading of a pose is uncertain by {measured_g:.2g %} of gravity.",
         "Too coarse a resolution (few digits, or counts taken for another unit), or a sensor that is not still.",
         "Write more digits or choose a smaller range, check the unit, and put the sensor down in every pose.",
     ),
-    (Code.WEAKLY_OBSERVABLE, "poses", WARNING): Words(
+    ("weakly-observable", "poses", WARNING): Words(
         "In some orientations gravity is predicted to {worst_prediction_g:.2g %} only (1 σ; measured in one pose to "
         "{measured_g:.2g %}); least certain: {weakest}.",
         "No pose lies near those orientations.",
         _ADD_POSES,
     ),
-    (Code.OUTLIER_POSE, "", WARNING): Words(
+    ("outlier-pose", "", WARNING): Words(
         "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
         "σ, limit {limit:.1f}).",
         "The sensor was touched or not static in this pose, or a reading clipped.",
         "Cut the outlier poses out of the log (`trihedron segment LOG` lists their times) and run again.",
     ),
-    (Code.NONLINEAR_RESIDUAL, "poses", SERIOUS): Words(
+    ("nonlinear-residual", "poses", SERIOUS): Words(
         "The gravity error in static poses has the shape of {is_quadratic:?a quadratic nonlinearity|{is_cubic:?a cubic "
         "nonlinearity{is_unlike:? or of a scale that differs between + and -|}|a scale that differs between + and -}} "
         "(odds 10^{log10_odds:.0f} against noise): poses in all directions would shift S and b by some "
@@ -65,30 +65,30 @@ ENTRIES = {
         "An accelerometer that is not linear, or one driven near its range limit.",
         "Run `trihedron diagnose LOG`: it looks for the effect.",
     ),
-    (Code.LEFT_HANDED, "accelerometer", NOTE): Words(
+    ("left-handed", "accelerometer", NOTE): Words(
         "The accelerometer's axes as stated form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
         "The documented axes of the board are left-handed, or one was stated wrong: poses alone do not determine "
         "signs, the moves of a gyro do.",
     ),
-    (Code.SCALE_NOT_NOMINAL, "accelerometer", WARNING): Words(
+    ("scale-not-nominal", "accelerometer", WARNING): Words(
         "The {is_common:?common scale of all axes|scale of {axis:axis}} is {scale_ratio:.4g} although the log is in "
         "{unit:unit}.",
         "{is_common:?The log is in another unit than stated, or gravity is wrong|That axis is damaged, or its column "
         "is of another quantity}.",
         "{is_common:?State the unit of the log (--accel-unit) and gravity|Check the axis and its column}.",
     ),
-    (Code.NOT_CONVERGED, "accelerometer", SERIOUS): Words(
+    ("not-converged", "accelerometer", SERIOUS): Words(
         "The accelerometer fit did not converge ({stopped_because}).",
         "Poses contradict each other, or hardly differ.",
         "Check that every pose was static; add poses.",
     ),
-    (Code.POSE_NOT_A_FACE, "", NOTE): Words(
+    ("pose-not-a-face", "", NOTE): Words(
         "{n_left_out} of {n_poses} poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
         "used by --method faces (poses {poses:&, }).",
         "They are edges, corners or leaning poses.",
         "--method joint uses them all.",
     ),
-    (Code.TABLE_TILT, "", WARNING): Words(
+    ("table-tilt", "", WARNING): Words(
         "The faces contradict each other (χ² per degree of "
         "freedom {chi2_per_dof:.3g}) as if each pose were tilted by {tilt_deg:.2g}° rms; most in pose {pose} ({face})"
         ". The standard uncertainties include this tilt.",
@@ -96,7 +96,7 @@ ENTRIES = {
         "Level the table and press the case flat; or record 9 or more poses in other orientations, which need neither.",
         or_severity=SERIOUS,
     ),
-    (Code.RESIDUAL_ABOVE_NOISE, "verify-static", WARNING): Words(
+    ("residual-above-noise", "verify-static", WARNING): Words(
         "The gravity error in static poses is {norm_rms_m_s2:.3g mm/s²} rms, {times:.2g} times what noise and "
         "uncertainty allow{is_offset:?, with one sign in {n_same} of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average "
         "({share:.2g %} of gravity)|}; largest for its uncertainty in pose "

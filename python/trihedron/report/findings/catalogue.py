@@ -19,7 +19,7 @@ from trihedron.report.findings import (
     segment,
     verify,
 )
-from trihedron.report.findings.entry import Code, Entry
+from trihedron.report.findings.entry import Entry
 from trihedron.report.findings.wording import filled
 
 STAGES = (
@@ -31,11 +31,11 @@ ENTRIES: tuple[Entry, ...] = tuple(
     for stage in STAGES
     for (code, case, severity), words in stage.ENTRIES.items()
 )
-CATALOGUE: Mapping[tuple[Code, str], Entry] = MappingProxyType({(entry.code, entry.case): entry for entry in ENTRIES})
+CATALOGUE: Mapping[tuple[str, str], Entry] = MappingProxyType({(entry.code, entry.case): entry for entry in ENTRIES})
 
 
 def words_of(
-    code: Code, case: str, severity: Severity | None, values: Mapping[str, Any]
+    code: str, case: str, severity: Severity | None, values: Mapping[str, Any]
 ) -> tuple[Severity, str, str, str]:
     """Severity, observation, likely cause and next action.
 

@@ -3,11 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from trihedron.records.finding import FindingCode as Code
 from trihedron.records.finding import Severity
 from trihedron.report.findings.wording import places
 
-__all__ = ["NOTE", "SERIOUS", "WARNING", "Code", "Entry", "Words"]
+__all__ = ["NOTE", "SERIOUS", "WARNING", "Entry", "Words"]
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 
@@ -36,6 +35,6 @@ class Words:
 class Entry(Words):
     """Sentences of the finding ``code``, and of one ``case`` where a code has several, with their default severity."""
 
-    code: Code
+    code: str
     case: str
     severity: Severity

@@ -1,74 +1,74 @@
 """Findings about a static log and its noise terms."""
 
-from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Code, Words
+from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Words
 
 _WIDENED = "Intervals were widened to allow for it."
 _HEATED = "{has_temperature:? while the temperature runs from {low_degc:.1f} to {high_degc:.1f} °C|}"
 _OR_LOGGED = "{has_temperature:?; `trihedron diagnose LOG` fits the temperature|, or log the temperature}"
 
 _LOG = {
-    (Code.REPEATED_ROWS, "static", WARNING): Words(
+    ("repeated-rows", "static", WARNING): Words(
         "{share:.2g %} of the rows repeat the row before in every channel.",
         "the log was written faster than the sensor measures, or resampled by holding the last value.",
         "N and Q then depend on the resampling; log at the sensor's own rate.",
     ),
-    (Code.LOG_JUMP, "", WARNING): Words(
+    ("log-jump", "", WARNING): Words(
         "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit:unit} at {time_s:.1f} s.",
         "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise.",
         "A jump of the mean looks like K and R; each side is fitted with a mean of its own, so that K excludes it.",
     ),
-    (Code.LOG_IMPACT, "", NOTE): Words(
+    ("log-impact", "", NOTE): Words(
         "{n_impacts:# short excursion} of up to {impact:abs .3g} {unit:unit}, the largest at {time_s:.1f} s.",
         "an impact on the table, a door, a lost or damaged reading.",
         "They raise N and Q; these intervals are excluded.",
     ),
-    (Code.LOG_MOTION, "", WARNING): Words(
+    ("log-motion", "", WARNING): Words(
         "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as elsewhere, first at "
         "{first_s:.1f} s.",
         "motion, vibration or handling during a log that should be static.",
         "They raise N; these intervals are excluded.",
     ),
-    (Code.LOG_MOTION, "throughout", SERIOUS): Words(
+    ("log-motion", "throughout", SERIOUS): Words(
         "Events cover {share:.0f %} of the log, too much to exclude: it is disturbed throughout.",
         "the sensor was not static.",
         "The terms describe the disturbance as much as the sensor; record a static log.",
     ),
-    (Code.LOG_MOTION, "turns", SERIOUS): Words(
+    ("log-motion", "turns", SERIOUS): Words(
         "Gravity turns by {turn_rad:.2g !deg}° every {every_s:.2g} s: the log given as static moves.",
         "the sensor was carried, turned or flown.",
         "Its N, B and K are those of the motion; record a static log, or compare the motion with a reference: "
         "`trihedron noise LOG --reference MOTION`.",
     ),
-    (Code.TEMPERATURE_DRIVEN, "noise", WARNING): Words(
+    ("temperature-driven", "noise", WARNING): Words(
         "The temperature runs from {low_degc:.0f} to {high_degc:.0f} °C and explains up to {share:.0f %} of the slow "
         "changes of {axes:axes}: B, K and R contain it.",
         "biases follow the temperature.",
         "For B, K and R log at a constant temperature; `trihedron diagnose LOG` fits it.",
     ),
-    (Code.LOG_TURNED, "", WARNING): Words(
+    ("log-turned", "", WARNING): Words(
         "The unit was turned by {turn_rad:.2g !deg}°, and B, K and R contain the turn; the longest interval "
         "in one direction is {start_s:.0f} to {stop_s:.0f} s.",
         "it was turned over, or its support tilted, during a log that should be static.",
         "For B, K and R take one direction alone: `trihedron allan LOG"
         "{is_first:?| --exclude :{start_s:.0f}}{is_last:?| --exclude {stop_s:.0f}:}`.",
     ),
-    (Code.TWO_LEVELS, "", WARNING): Words(
+    ("two-levels", "", WARNING): Words(
         "The level switches between two values: {axes:each; }. B, K and R describe the switching, no noise of theirs.",
         "telegraph noise of the sensor, a heater or a supply that switches.",
         "Of that axis take N alone; a filter needs a bias that jumps, or replace the sensor.",
         lines={"axes": "{v0:axis} by {v1:.3g} {v2:unit}, {v3} times, every {v4:.2g} s"},
     ),
-    (Code.STRETCHES_EXCLUDED, "", NOTE): Words(
+    ("stretches-excluded", "", NOTE): Words(
         "{n_stretches:# interval} of together {excluded_s:.3g} s ({share:.2g %} of the log) excluded.",
         "",
         "Clusters there are means of the readings that remain, weighted by their number; nothing is interpolated.",
     ),
-    (Code.CLIPPING, "static", SERIOUS): Words(
+    ("clipping", "static", SERIOUS): Words(
         "{share:.2g %} of the readings lie on the same extreme value.",
         "the sensor or the ADC is at its range limit.",
         "Every term comes out too small; use a wider range or another orientation.",
     ),
-    (Code.QUANTISATION_DEAD, "", SERIOUS): Words(
+    ("quantisation-dead", "", SERIOUS): Words(
         "One reading's noise ({sigma:.3g} {unit:unit}) is below half the resolution (LSB {resolution:.3g} "
         "{unit:unit}): {repeated:.0f %} of the readings repeat the one before.",
         "the resolution is coarser than the noise.",
@@ -78,19 +78,19 @@ _LOG = {
 }
 
 _SPECTRUM = {
-    (Code.SPECTRAL_LINE, "", NOTE): Words(
+    ("spectral-line", "", NOTE): Words(
         "{n_lines:# periodic line}: {strongest:each}{has_more:? and {n_more} more|}.",
         "mains, a fan, vibration of the building, or a clock inside the sensor.",
         "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
         lines={"strongest": "{v0:.4g} Hz ({v1:.2g} {v2:unit})"},
     ),
-    (Code.SPECTRUM_LOW_PASS, "throughout", SERIOUS): Words(
+    ("spectrum-low-pass", "throughout", SERIOUS): Words(
         "No part of the upper spectrum is a sum of noise terms.",
         "resampling, a narrow filter or periodic disturbance shapes the whole band.",
         "N and Q are not those of the sensor; log at its own rate without filtering.",
     ),
     **{
-        (Code.SPECTRUM_LOW_PASS, way, WARNING): Words(
+        ("spectrum-low-pass", way, WARNING): Words(
             f"Above {{highest_hz:.3g}} Hz the spectrum leaves the noise terms and {way} to {{ratio:.3g %}} of them at "
             "{nyquist_hz:.3g} Hz.",
             cause,
@@ -102,12 +102,12 @@ _SPECTRUM = {
             ("rises", "aliasing, resampling, a resonance or vibration."),
         )
     },
-    (Code.SPECTRUM_LOW_PASS, "curve", WARNING): Words(
+    ("spectrum-low-pass", "curve", WARNING): Words(
         "Below {first_s:.3g} s the curve is not a sum of noise terms.",
         "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance.",
         "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
     ),
-    (Code.SPECTRUM_UNEXPLAINED, "", WARNING): Words(
+    ("spectrum-unexplained", "", WARNING): Words(
         "Near {frequency_hz:.2g} Hz (means of {tau_s:.2g} s) the power lies {deviation:abs .0f %} "
         "{deviation:<below|above} the fitted terms.",
         "disturbance that is not noise (temperature, daily life of the building), or noise of another shape.",
@@ -116,39 +116,39 @@ _SPECTRUM = {
 }
 
 _TERMS = {
-    (Code.CURVE_ALONE, "", NOTE): Words(
+    ("curve-alone", "", NOTE): Words(
         "The terms come from Allan deviations alone, taken as overlapping ones of an undisturbed log.",
         "",
         "Jumps, impacts, spectral lines and gaps cannot be separated from noise in a curve; use the log if there "
         "is one.",
     ),
-    (Code.SLOW_NOISE_UNRESOLVED, "", NOTE): Words(
+    ("slow-noise-unresolved", "", NOTE): Words(
         "Slow noise is there; B and K are not separable here: B at least "
         "{flicker_lower:.2g}, at most {flicker_upper:.2g} {unit:unit}, K at least {walk_lower:.2g}, at most "
         "{walk_upper:.2g} {unit:unit}/√s, not both 0.",
         "the log is short compared with the times over which flicker and walk differ.",
         "Variances of means use the most likely sum of both; record longer to separate them.",
     ),
-    (Code.LOG_DRIFT, "", WARNING): Words(
+    ("log-drift", "", WARNING): Words(
         "The level drifts by {drift:.3g} {unit:unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit:unit}/s)"
         f"{_HEATED}.",
         "warming up, or a change of the room's temperature.",
         f"R describes this log, not the sensor; let it warm up{_OR_LOGGED}.",
     ),
-    (Code.LOG_DRIFT, "warm-up", WARNING): Words(
+    ("log-drift", "warm-up", WARNING): Words(
         "The level changes by {drift:.3g} {unit:unit} with a time constant of {time_s:.3g} s"
         f"{_HEATED}; that was subtracted.",
         "warming up.",
         "N is that of the sensor; B and K contain what the curve leaves of the warm-up. For those of the warm sensor "
         f"leave off three time constants (`trihedron allan LOG --exclude :SECONDS`){_OR_LOGGED}.",
     ),
-    (Code.LOG_DRIFT, "wave", WARNING): Words(
+    ("log-drift", "wave", WARNING): Words(
         "The slow changes are a wave of period {period_s:.3g} s, amplitude {amplitude:.2g} {unit:unit}, which was "
         "subtracted.",
         "a cycle of the temperature (heating, air conditioning), or of the supply.",
         "The terms are those of the noise beside it; find what has that period, and record without it.",
     ),
-    (Code.LOG_TOO_SHORT, "", NOTE): Words(
+    ("log-too-short", "", NOTE): Words(
         "No minimum before the log's end: K is below {limit:.2g} {unit:unit}/√s (upper limit).",
         "the log is short compared with the sensor's stability.",
         "Record longer to find the best averaging time.",

@@ -37,9 +37,9 @@ This page is made from the catalogue (`python/trihedron/report/effects/`).
 
 def page() -> str:
     """Markdown, by code in alphabetical order."""
-    ordered = sorted(ENTRIES, key=lambda entry: (entry.code.value, entry.case))
+    ordered = sorted(ENTRIES, key=lambda entry: (entry.code, entry.case))
     parts = [_HEAD]
-    for code, entries in groupby(ordered, key=lambda entry: entry.code.value):
+    for code, entries in groupby(ordered, key=lambda entry: entry.code):
         parts.append(f"\n## {code}\n")
         parts += [_entry(entry) for entry in entries]
     return "".join(parts)

@@ -1,9 +1,9 @@
 """Findings of ``verify``: parameters that differ, errors larger than without a calibration, what is not tested."""
 
-from trihedron.report.findings.entry import SERIOUS, WARNING, Code, Words
+from trihedron.report.findings.entry import SERIOUS, WARNING, Words
 
 ENTRIES = {
-    (Code.CALIBRATION_SHIFT, "", WARNING): Words(
+    ("calibration-shift", "", WARNING): Words(
         "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
         "both uncertainties and the bias drift in this log allow, {first:ids} by {times_sigma:.0f} σ; log − file: "
         "{parameters:each}.",
@@ -12,7 +12,7 @@ ENTRIES = {
         "together give the repeatability of each.",
         lines={"parameters": "{v0:ids} {v1:quantity}"},
     ),
-    (Code.CALIBRATION_SHIFT, "gyro-bias-alone", WARNING): Words(
+    ("calibration-shift", "gyro-bias-alone", WARNING): Words(
         "The gyro bias changed since the calibration by {parameters:each}, up to {times_sigma:.0f} times what both "
         "uncertainties and the bias drift in this log allow.",
         "Repeatability of the gyro bias (turn-on, temperature), which a calibration of one session does not contain.",
@@ -20,20 +20,20 @@ ENTRIES = {
         "give its repeatability.",
         lines={"parameters": "{v1:quantity} ({v2:axis})"},
     ),
-    (Code.WORSE_THAN_UNCALIBRATED, "verify-static", SERIOUS): Words(
+    ("worse-than-uncalibrated", "verify-static", SERIOUS): Words(
         "Worse than no calibration: the gravity error in static poses is {rms:.3g mm/s²} rms with it and "
         "{rms_without:.3g mm/s²} without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
         "calibration|A wrong file, unit, axis or sign, or a calibration of too few poses}.",
         "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units}.",
     ),
-    (Code.WORSE_THAN_UNCALIBRATED, "reference", WARNING): Words(
+    ("worse-than-uncalibrated", "reference", WARNING): Words(
         "The accelerometer is not improved: the gravity error in static poses is {rms_m_s2:.3g mm/s²} rms with this "
         "calibration, uncertain by {expected_m_s2:.2g mm/s²}, and {rms_without_m_s2:.3g mm/s²} without.",
         "Motion determines the accelerometer less accurately than the uncorrected readings are.",
         "Use the gyro alone; calibrate the accelerometer in 18 or more static poses (`trihedron plan`).",
     ),
-    (Code.WORSE_THAN_UNCALIBRATED, "verify-moves", SERIOUS): Words(
+    ("worse-than-uncalibrated", "verify-moves", SERIOUS): Words(
         "Worse than no calibration: the tilt error after a rotation is {rms:.3g}° rms with it and {rms_without:.3g}° "
         "without.",
         "{is_few:?In the file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own "
@@ -43,14 +43,14 @@ ENTRIES = {
         "Do not use it: check {is_few:?{shifted:ids} in the file|that the file is of this sensor, in the log's units, "
         "with its right clock (--time-unit, or `--columns time=none --rate HZ`)}.",
     ),
-    (Code.NOT_TESTED, "", WARNING): Words(
+    ("not-tested", "", WARNING): Words(
         "Most parameters of the {sensors:& and } are not tested: {poses:# pose} and {moves:# move} of this log do not "
         "determine them.",
         "Few orientations or rotations: an error of the calibration that shows in others passes.",
         "Record 9 or more poses in different orientations, with rotations between them, and verify on that log.",
     ),
     **{
-        (Code.CALIBRATION_IMPRECISE, case, WARNING): Words(
+        ("calibration-imprecise", case, WARNING): Words(
             f"The {error} is {{times:.2g}} times that of this log's own calibration, cross-validated, yet within the "
             "uncertainty of the calibration (p = {p:.1g}).",
             "A calibration of few poses, or one whose biases return within a wide range.",
@@ -58,7 +58,7 @@ ENTRIES = {
         )
         for case, error in (("static", "gravity error in static poses"), ("moves", "tilt error after a rotation"))
     },
-    (Code.CALIBRATION_SHIFT, "gyro-bias", SERIOUS): Words(
+    ("calibration-shift", "gyro-bias", SERIOUS): Words(
         "In static poses the calibrated gyro reads {rate_rad_s:.3g °/s}, {times_expected:.0f} times what the bias "
         "repeatability of typical gyros, the scatter of the poses and the stated uncertainty allow "
         "({sigma_rad_s:.2g °/s}){is_alone:?|: not its bias alone has changed}.",
