@@ -13,7 +13,8 @@ from trihedron.records import Finding, Severity
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
-from trihedron.report.findings.wording import filled
+from trihedron.report.findings.phrases import PHRASES
+from trihedron.report.findings.wording import filled, places
 from trihedron.report.in_python import in_python
 
 PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
@@ -147,3 +148,19 @@ def test_a_place_in_a_sentence_takes_si_and_says_its_unit_its_number_and_its_bra
 def test_in_python_a_sentence_names_parameters_and_a_command_stays_a_command():
     said = in_python("Give --latitude DEG (and --height M), or run `trihedron calibrate LOG --latitude DEG`.")
     assert said == "Give latitude_deg (and height_m), or run `trihedron calibrate LOG --latitude DEG`."
+
+
+def test_every_phrase_of_a_stage_is_in_the_catalogue_with_its_places_and_every_phrase_is_used():
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in (one for one in ast.walk(ast.parse(path.read_text())) if isinstance(one, ast.Call)):
+            if not (isinstance(node.func, ast.Name) and node.func.id in {"words", "remarked"}):
+                continue
+            name = node.args[-1]
+            given = {keyword.arg for keyword in node.keywords} | ({"ratio"} if node.func.id == "remarked" else set())
+            for phrase in _choices(name) or ():
+                assert phrase in PHRASES, f"{path.name}:{node.lineno}: {phrase}"
+                assert None in given or given >= places(PHRASES[phrase]), f"{path.name}:{node.lineno}: {phrase}"
+    # Reasons of a stop are named by the core.
+    sources = [path for path in PACKAGE.rglob("*.py") if path.parent.name != "findings"]
+    texts = "\n".join(path.read_text() for path in [*sources, *(PACKAGE.parents[1] / "rust").rglob("*.rs")])
+    assert {phrase for phrase in PHRASES if f'"{phrase}"' not in texts} == set()

@@ -14,10 +14,11 @@ from trihedron.estimate.attitude import integrate_rate
 from trihedron.probability import fdtrc, stdtrit
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
+from trihedron.records.words import words
 from trihedron.sensor_model import correct
 from trihedron.simulate import Scenario
 from trihedron.transforms import directions_of
-from trihedron.units import degrees_from_radians, rate_to_si
+from trihedron.units import rate_to_si
 
 AIMED_AT = (0.9, 1.1)
 """Ratio of the gravity errors in poses and moves, simulation over recording, within which the two are alike."""
@@ -93,28 +94,15 @@ def _row(what: What, squares: Sequence[float | None], seen: float | None, alpha:
     differs = beyond > half
     interval = (math.exp(apart - half), math.exp(apart + half))
     model, recording = math.exp(float(np.mean(logs))), math.sqrt(seen)
-    remark = _remark(what, math.exp(apart), interval, k, alpha) if differs else ""
+    said = {"ratio": math.exp(apart), "low": interval[0], "high": interval[1], "level": 100.0 * (1.0 - 2.0 * alpha)}
+    case = "poses-miss" if what == "poses" else "moves-miss"
+    remark = words(case, **said, simulations=k, is_above=apart > 0.0) if differs else ""
     sensor, unit = _OF[what]
     ratio = model / recording
     return NoiseDifference(sensor, "", what, model, recording, ratio, interval, unit, p, differs, remark)
 
 
 _OF: dict[What, tuple[Sensor, str]] = {"poses": ("accelerometer", "m/s^2"), "moves": ("gyroscope", "rad")}
-_CAUSE = {
-    ("poses", True): "noise inside the poses (a tremor, a line) does not go on between them as the model's does",
-    ("poses", False): "the bias changes from pose to pose by more than the model's noise",
-    ("moves", True): "the gyro of the model strays more in moves than this one",
-    ("moves", False): "the gyro's bias changes during moves, or motion is faster than the samples",
-}
-
-
-def _remark(what: What, ratio: float, interval: tuple[float, float], k: int, alpha: float) -> str:
-    of = "The gravity errors in poses" if what == "poses" else "The tilt errors after rotations"
-    return (
-        f"{of} of the model, moved as the log was, are {ratio:.2f} times as large as the log's "
-        f"({100.0 * (1.0 - 2.0 * alpha):g} % {interval[0]:.2f} to {interval[1]:.2f}, {k} simulations); "
-        f"{_CAUSE[what, ratio > 1.0]}."
-    )
 
 
 OPPOSITE = -0.9
@@ -126,12 +114,7 @@ def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference 
     seen = carried_gravity(recording, segments)
     if seen is None or not seen.is_of_world:
         return None
-    body, world = degrees_from_radians(seen.body_rad), degrees_from_radians(seen.world_rad)
-    remark = (
-        f"The gyro of the model reads rates along the axes of the world, not of the body: the tilt error "
-        f"after rotations is {body:.0f}° if they are the body's and {world:.1f}° if they are the world's. Turn them by "
-        "the transpose of the attitude; until then only its accelerometer is compared."
-    )
+    remark = words("rates-of-world", body_rad=seen.body_rad, world_rad=seen.world_rad)
     return difference("gyroscope", "frame", (None, None), "1", remark)
 
 
@@ -144,11 +127,7 @@ def sign_of_gravity(
         return None
     if float(np.mean(np.sum(ours * theirs, axis=1))) > OPPOSITE:
         return None
-    remark = (
-        "Gravity has the opposite sign in the model, pose by pose: a static accelerometer reads +g along the axis "
-        "that points up (specific force), not −g."
-    )
-    return difference("accelerometer", "frame", (-1.0, 1.0), "1", remark, ratio=-1.0)
+    return difference("accelerometer", "frame", (-1.0, 1.0), "1", words("gravity-upside-down"), ratio=-1.0)
 
 
 def _gravity(segments: Segments, calibration: Calibration) -> FloatArray | None:

@@ -25,6 +25,7 @@ from trihedron.records.diagnosis import (
 )  # fmt: skip
 from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.records.pose_noise import PoseNoise
+from trihedron.records.words import words
 
 DECIBEL = 20.0 / math.log(10.0)
 FEWEST_POSES = 4
@@ -198,14 +199,9 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
 def _factor(one: CommonFactor) -> NoiseDifference:
     ratio = 1.0 / one.factor
     name = "gyro" if one.sensor == "gyroscope" else one.sensor
-    if not one.written:
-        remark = f"The {name} of the model counts {ratio:g} times as many per unit: another range of the part."
-    elif one.side:
-        remark = f"The {name} of the model reads {ratio:.4g} times the recording's"
-        remark += f": the {one.side} writes {one.written} where it says {one.taken}."
-    else:
-        remark = f"The {name} of the model reads {ratio:.4g} times the recording's"
-        remark += f", the ratio of {one.taken} to {one.written}: one of the two is in the wrong unit."
+    units = {"side": one.side, "written": one.written, "taken": one.taken}
+    case = "range-ratio" if not one.written else "unit-of-side" if one.side else "unit-ratio"
+    remark = words(case, sensor=name, ratio=ratio, **units)
     return difference(one.sensor, "unit" if one.written else "range", (None, None), "1", remark, ratio=ratio)
 
 

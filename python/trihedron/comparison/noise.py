@@ -17,6 +17,7 @@ from trihedron.records import Pose, Recording
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
 from trihedron.records.sampling import TimestampKind
+from trihedron.records.words import Words, words
 from trihedron.sensor_model import axis_scales
 
 NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
@@ -56,14 +57,11 @@ def compare_draws(
     # Four standard errors of a kurtosis of n correlated differences must fit between the two values.
     is_measured = is_fine and 4.0 * math.sqrt(48.0 / max(n, 1)) <= -middle
     if is_measured and model.excess < middle < recording.excess:
-        remark = f"The noise of the model's {NAMES[sensor]} is uniformly distributed; the recording's is normal."
+        remark = words("model-uniform", sensor=NAMES[sensor])
         yield difference(sensor, "distribution", (model.excess, recording.excess), "excess kurtosis", remark)
     if n >= FEWEST and model.likeness > ONE_DRAW and recording.likeness < OWN_DRAWS:
-        remark = (
-            f"The noise of the model's {NAMES[sensor]} is one and the same on all three axes (they correlate by "
-            f"{model.likeness:.2f}, the recording's by {recording.likeness:.2f}): it was drawn once instead of three "
-            "times."
-        )
+        likeness = {"model": model.likeness, "recording": recording.likeness}
+        remark = words("model-one-draw", sensor=NAMES[sensor], **likeness)
         yield difference(sensor, "distribution", (model.likeness, recording.likeness), "correlation of axes", remark)
 
 
@@ -189,9 +187,8 @@ def _hidden(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, unit: str) ->
     side, other = ("model", "recording") if quiet is m else ("recording", "model")
     assert loud.white is not None
     would_show = loud.reading_sigma > SHOWS * quiet.step
-    name = NAMES[sensor]
-    hides = f"The resolution (LSB) of the {side} hides the noise of its {name}."
-    remark = f"The {side} has no noise on the {name}; the {other} has." if would_show else hides
+    case = "noise-missing" if would_show else "noise-hidden"
+    remark = words(case, side=side, other=other, sensor=NAMES[sensor])
     return replace(difference(sensor, "N", _values(m.white, r.white), unit, remark, axis=axis), significant=would_show)
 
 
@@ -206,22 +203,18 @@ def _resembling(
     ratios = np.array([w.ratio for w in known], dtype=np.float64)
     common = float(np.exp(np.mean(np.log(ratios))))
     root = math.sqrt(rate_hz)
-    for factor, times, words in (
-        (root, f"√{rate_hz:.4g}", "the density was multiplied by the root of the rate once too often"),
-        (1.0 / root, f"1/√{rate_hz:.4g}", "the density was not multiplied by the root of the rate when it was sampled"),
-    ):
+    for factor, is_above in ((root, True), (1.0 / root, False)):
         if max(common / factor, factor / common) < RESEMBLES:
-            said = f"White noise of the {name} is {common:.3g} = {times} times the recording's: {words}."
-            return [replace(w, remark=said) if w in known else w for w in white]
+            remark = words("white-by-rate", sensor=name, ratio=common, rate_hz=rate_hz, is_above=is_above)
+            return [replace(w, remark=remark) if w in known else w for w in white]
     seen = np.array([w.recording or 0.0 for w in known])
-    said = ""
+    said = Words("")
     if only_model_is_even and seen.max() > UNLIKE_AXES * seen.min():
-        said = f"White noise of the {name} is the same on all axes of the model; "
-        said += f"the recording's axes differ {float(seen.max() / seen.min()):.2g} times."
+        said = words("white-same-on-axes", sensor=name, times=float(seen.max() / seen.min()))
     elif ratios.max() < LEAST_OCTAVE_RATIO * ratios.min():
         low = min(w.interval[0] for w in known if w.interval)
         high = max(w.interval[1] for w in known if w.interval)
-        said = f"White noise of the {name} is {common:.3g} ({low:.3g} to {high:.3g}) times the recording's."
+        said = words("white-ratio", sensor=name, ratio=common, low=low, high=high)
     return [replace(w, remark=said) if said and w.significant else w for w in white]
 
 
@@ -247,7 +240,6 @@ def _step(
 ) -> Iterator[NoiseDifference]:
     """Difference of the LSB of one axis, each side given with all axes of its sensor."""
     m, r = model[0], recording[0]
-    name = NAMES[sensor]
     m_shows, r_shows = _shows_steps(*model), _shows_steps(*recording)
     if not (m_shows or r_shows):
         return
@@ -255,7 +247,8 @@ def _step(
         # Readings finer than their noise shows: only an LSB larger than the noise is missed.
         coarse = m if m_shows else r
         side = "recording" if m_shows else "model"
-        remark = f"The {side} has no resolution (LSB) on the {name}." if coarse.step > coarse.reading_sigma else ""
+        is_missed = coarse.step > coarse.reading_sigma
+        remark = words("resolution-missing", side=side, sensor=NAMES[sensor]) if is_missed else ""
         yield difference(sensor, "resolution", (m.step, r.step), UNIT[sensor], remark, axis=axis)
         return
     ratio = m.step / r.step
@@ -263,7 +256,7 @@ def _step(
     # Steps far below the noise may be the digits of a file.
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
-    remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
+    remark = words("resolution-ratio", sensor=NAMES[sensor], ratio=ratio) if is_far else ""
     yield difference(sensor, "resolution", (m.step, r.step), UNIT[sensor], remark, axis=axis, ratio=ratio)
 
 
@@ -287,8 +280,7 @@ def _corner(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float)
         return
     is_clear = seen.corner_hz.upper * LEAST_CORNER_RATIO < other.corner_above_hz
     side = "recording" if seen is r else "model"
-    name = f"{NAMES[sensor]} {axis.upper()}"
-    remark = f"The noise of the {name} is filtered in the {side} only (corner {seen.corner_hz.value:.3g} Hz)."
+    remark = words("filtered-once", sensor=NAMES[sensor], axis=axis, side=side, corner_hz=seen.corner_hz.value)
     values = _values(m.corner_hz, r.corner_hz)
     yield difference(sensor, "bandwidth", values, "Hz", remark if is_clear else "", axis=axis)
 
@@ -311,9 +303,8 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
         is_off = ratio.p_value < alpha and not ratio.lower < white.value**2 < ratio.upper
         # Above the corner the filter differs, which is reported by itself.
         is_off = is_off and not (filters_differ and octave.high_hz > min(corners))
-        band = f"{octave.low_hz:g} to {octave.high_hz:g} Hz"
-        name = NAMES[sensor]
-        remark = f"Noise of the {name} {axis.upper()} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
+        band = {"low_hz": octave.low_hz, "high_hz": octave.high_hz}
+        remark = words("octave-ratio", sensor=NAMES[sensor], axis=axis, ratio=math.sqrt(ratio.value), **band)
         yield NoiseDifference(
             sensor, axis, "octave", math.sqrt(other.density.value), math.sqrt(octave.density.value),
             math.sqrt(ratio.value), (math.sqrt(ratio.lower), math.sqrt(ratio.upper)),
@@ -324,7 +315,7 @@ def _octaves(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float
 
 def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
     ratio = model.rate_hz / recording.rate_hz
-    remark = f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz."
+    remark = words("rate-ratio", model_hz=model.rate_hz, recording_hz=recording.rate_hz)
     is_far = max(ratio, 1.0 / ratio) > LEAST_RATE_RATIO
     rates = model.rate_hz, recording.rate_hz
     yield difference("both", "rate", rates, "Hz", remark if is_far else "", ratio=ratio)
@@ -335,9 +326,7 @@ def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
     larger, smaller = max(model.jitter_steps, recording.jitter_steps), min(model.jitter_steps, recording.jitter_steps)
     is_far = larger > LEAST_JITTER and larger > 2.0 * smaller
     which = "model" if m > r else "recording"
-    remark = (
-        f"The timestamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
-    )
+    remark = words("timestamps-scatter", side=which, larger_s=max(m, r), smaller_s=min(m, r))
     if which == "recording" and model.jitter_steps < PERFECT_CLOCK:
-        remark = f"The clock of the model is perfect; the timestamps of the recording scatter by {1e3 * r:.2g} ms."
+        remark = words("clock-perfect", jitter_s=r)
     yield difference("both", "jitter", (m, r), "s", remark if is_far else "", ratio=m / r if r > 0.0 else None)

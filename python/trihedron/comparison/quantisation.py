@@ -8,11 +8,12 @@ import numpy as np
 
 from trihedron.arrays import AXES
 from trihedron.comparison.noise import Sampled
-from trihedron.comparison.rows import NAMES, SENSORS, Sensor, difference, measured_row
+from trihedron.comparison.rows import NAMES, SENSORS, Sensor, difference, measured_row, remarked
 from trihedron.estimate.noise.slow import Octaves
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import NoiseDifference
 from trihedron.records.pose_noise import Measured, PoseNoise
+from trihedron.records.words import words
 
 SHARE = 1.0 / 24.0
 """Share of alpha that white noise, corners, octaves, slow noise and the parameters leave."""
@@ -90,14 +91,14 @@ def _axis(sensor: Sensor, axis: str, m: PoseNoise, r: PoseNoise, alpha: float) -
         return
     unit = "m/s" if sensor == "accelerometer" else "rad"
     if made.is_shown and seen.is_shown:
-        remark = f"Quantisation noise of the {NAMES[sensor]} {axis} is {{ratio:.2g}} times the recording's."
-        yield measured_row(sensor, axis, "Q", (made.measured(), seen.measured()), unit, LEAST_RATIO, alpha, remark)
+        row = measured_row(sensor, axis, "Q", (made.measured(), seen.measured()), unit, LEAST_RATIO, alpha)
+        yield remarked(row, "quantisation-ratio", sensor=NAMES[sensor], axis=axis)
         return
     apart = abs(made.quantisation - seen.quantisation)
     p_value = math.erfc(apart / math.hypot(made.sigma, seen.sigma) / math.sqrt(2.0))
     less, more = sorted((made, seen), key=lambda one: one.quantisation)
     is_off = p_value < alpha and more.quantisation > LEAST_RATIO**2 * (less.quantisation + 2.0 * less.sigma)
     side = "model" if made.is_shown else "recording"
-    remark = f"Only the {side} has quantisation noise on the {NAMES[sensor]} {axis}: noise that rises with frequency."
+    remark = words("quantisation-once", side=side, sensor=NAMES[sensor], axis=axis)
     values = math.sqrt(made.quantisation), math.sqrt(seen.quantisation)
     yield difference(sensor, "Q", values, unit, remark if is_off else "", axis=axis, p_value=p_value)

@@ -1,12 +1,14 @@
 """Rows of the comparison of noise: one figure of a model and of a recording."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.pose_noise import Measured
+from trihedron.records.words import words
 
 Sensor = Literal["accelerometer", "gyroscope"]
 SENSORS: tuple[Sensor, Sensor] = ("accelerometer", "gyroscope")
@@ -22,15 +24,19 @@ def measured_row(
     unit: str,
     least: float,
     alpha: float,
-    remark: str = "",
 ) -> NoiseDifference:
-    """A figure that both sides have; it differs beyond chance and the ratio ``least``, and then has the ``remark``."""
+    """A figure that both sides have; it differs beyond chance and the ratio ``least``."""
     ratio = ratio_of(*pair)
     differs = bool(ratio.p_value < alpha and max(ratio.value, 1.0 / ratio.value) > least)
     return NoiseDifference(
         sensor, axis, term, pair[0].value, pair[1].value, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value,
-        differs, remark.format(ratio=ratio.value) if differs else "",
+        differs, "",
     )  # fmt: skip
+
+
+def remarked(row: NoiseDifference, phrase: str, **values: Any) -> NoiseDifference:
+    """The row with a remark on its ratio, where it differs."""
+    return replace(row, remark=words(phrase, ratio=row.ratio, **values)) if row.significant else row
 
 
 def difference(

@@ -9,13 +9,14 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
 from trihedron.comparison.noise import Sampled
-from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, measured_row
+from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, measured_row, remarked
 from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow, correlation_time
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
 from trihedron.records.domains import Domain
 from trihedron.records.pose_noise import Measured
+from trihedron.records.words import Words, words
 from trihedron.segment import resegment
 from trihedron.sensor_model import correct
 from trihedron.transforms import directions_of
@@ -36,32 +37,28 @@ def correlation_times(model: Sampled, recording: Sampled, *, alpha: float) -> tu
         if sensor in model.noise and sensor in recording.noise
     }
     both = {sensor: (m, r) for sensor, (m, r) in times.items() if m is not None and r is not None}
-    shared = _one_for_both(both, alpha)
-    remark = "The noise of the {} forgets in {:.2g} s, the recording's in {:.2g} s."
-    return tuple(
-        measured_row(
-            sensor, "", "correlation-time", (m, r), "s", LEAST_TIME_RATIO, alpha / TESTS,
-            shared or remark.format(NAMES[sensor], m.value, r.value),
-        )
-        for sensor, (m, r) in both.items()
-    )  # fmt: skip
+    is_one = _is_one_for_both(both, alpha)
+    out = []
+    for sensor, (m, r) in both.items():
+        row = measured_row(sensor, "", "correlation-time", (m, r), "s", LEAST_TIME_RATIO, alpha / TESTS)
+        if is_one:
+            (m_a, r_a), (m_g, r_g) = both["accelerometer"], both["gyroscope"]
+            seen = {"accelerometer_s": r_a.value, "gyroscope_s": r_g.value}
+            out.append(remarked(row, "one-time-for-both", model_s=math.sqrt(m_a.value * m_g.value), **seen))
+        else:
+            out.append(remarked(row, "time-ratio", sensor=NAMES[sensor], model_s=m.value, recording_s=r.value))
+    return tuple(out)
 
 
-def _one_for_both(both: Mapping[Sensor, tuple[Measured, Measured]], alpha: float) -> str:
-    """The sentence for a simulation with one time for both sensors where the recording's differ; else empty."""
+def _is_one_for_both(both: Mapping[Sensor, tuple[Measured, Measured]], alpha: float) -> bool:
+    """Whether a simulation has one time for both sensors where the recording's differ."""
     if len(both) < len(SENSORS):
-        return ""
+        return False
     (m_a, r_a), (m_g, r_g) = (both[sensor] for sensor in SENSORS)
     model, recording = ratio_of(m_a, m_g), ratio_of(r_a, r_g)
     is_one = model.lower <= 1.0 <= model.upper and max(model.value, 1.0 / model.value) < ALIKE
     differ = recording.p_value < alpha / TESTS and max(recording.value, 1.0 / recording.value) > LEAST_TIME_RATIO
-    if not (is_one and differ):
-        return ""
-    return (
-        f"The noise of both sensors of the model forgets in the same time, {math.sqrt(m_a.value * m_g.value):.2g} s; "
-        f"the recording's accelerometer in {r_a.value:.2g} s, its gyro in {r_g.value:.2g} s: one time constant was "
-        "used for both."
-    )
+    return is_one and differ
 
 
 LEAST_SLOW_RATIO = 2.0
@@ -196,21 +193,14 @@ def _poses(shown_s: FloatArray, recording: Recording, segments: Segments) -> tup
     return length_s, means
 
 
-def _remark(sensor: Sensor, found: SlowDifference, common: float, rate_hz: float) -> str:
-    name = "Bias instability" if found.term == "B" else "The walk"
-    said = f"{name} of the {NAMES[sensor]} is {common:.2g} times the recording's"
+def _remark(sensor: Sensor, found: SlowDifference, common: float, rate_hz: float) -> Words:
     root = math.sqrt(rate_hz)
-    if found.term == "K":
-        for factor, words in (
-            (root, f"√{rate_hz:.4g}: its steps were not scaled by the root of the time step"),
-            (1.0 / root, f"1/√{rate_hz:.4g}: its steps were scaled by the time step instead of its root"),
-        ):
-            if max(common / factor, factor / common) < RESEMBLES_SLOW:
-                return f"{said}, about {words}."
-    return said + "."
+    for factor, is_above in ((root, True), (1.0 / root, False)):
+        if found.term == "K" and max(common / factor, factor / common) < RESEMBLES_SLOW:
+            return words("walk-by-rate", sensor=NAMES[sensor], ratio=common, rate_hz=rate_hz, is_above=is_above)
+    return words("slow-ratio", sensor=NAMES[sensor], ratio=common, is_flicker=found.term == "B")
 
 
-def _unseen(term: str, model: Measured, recording: Measured) -> str:
-    unseen = [(side, one) for side, one in (("the model", model), ("the recording", recording)) if not one.lower > 0.0]
-    bounds = " and ".join(f"{side} below {one.upper:.2g}" for side, one in unseen)
-    return f"Not long enough to show {term}: 0 is not excluded, 97.5 % of {bounds}; the figure is a median."
+def _unseen(term: str, model: Measured, recording: Measured) -> Words:
+    unseen = [(side, one.upper) for side, one in (("model", model), ("recording", recording)) if not one.lower > 0.0]
+    return words("slow-unseen", term=term, unseen=unseen)

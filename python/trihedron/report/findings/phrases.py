@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from trihedron.report.findings.compared import COMPARED
 from trihedron.report.findings.wording import filled
 
 LINES: Mapping[str, str] = MappingProxyType(
     {
         "towards": "/{v1}{v0:axis}",
         "devices": "{v0} ({v1} rows)",
+        "unseen": "the {v0} below {v1:.2g}",
         "words": "{v0} ({v1})",
         "streams": "{v0} ({v1} messages)",
         "turns": "{v0:axes} {v1:?starting with {v3:axis} up|{v2:?twice, each of the other axes up once at the "
@@ -20,6 +22,7 @@ LINES: Mapping[str, str] = MappingProxyType(
 
 PHRASES: Mapping[str, str] = MappingProxyType(
     {
+        **COMPARED,
         # parameters of a triad
         "scale-of-axis": "scale of {axis:axis}",
         "angle-between-axes": "angle between {one:axis} and {other:axis}",
