@@ -1,7 +1,7 @@
 """Noise of means over time: differences between the means of neighbouring intervals, pooled over all poses."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,14 +51,19 @@ def split_by_halves(mean: FloatArray, ranges: list[Range]) -> HalvesDifferences:
     return HalvesDifferences(*_core.halves_of(mean, np.array(ranges, dtype=np.int64).reshape(-1, 2)))
 
 
-def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = False) -> MeanNoise:
+def pool_mean_noise(
+    channels: Channels, ranges: list[Range], is_robust: bool = False, excess: FloatArray | None = None
+) -> MeanNoise:
     """Fit white noise, flicker and walk to the differences of halves of all ranges of blocks together, by octave.
 
     Weights are those of a variance with as many degrees of freedom as there are differences; robust uses the median of
-    the squares (over that of chi-square with one degree of freedom), for use before the edges are trimmed.
+    the squares (over that of chi-square with one degree of freedom), for use before the edges are trimmed. ``excess``
+    (ranges, c) is by how much the variance of each is larger.
     """
     n_channels = channels.mean.shape[1]
     halves = split_by_halves(channels.mean, ranges)
+    if excess is not None:
+        halves = replace(halves, square=halves.square / excess[halves.stretch])
     rounding = channels.quantisation_variance / channels.length
     if not len(halves.size):
         white = np.vstack([channels.variance[a:b] for a, b in ranges]).mean(axis=0) / channels.length

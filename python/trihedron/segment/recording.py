@@ -16,8 +16,8 @@ from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
 from trihedron.segment.judge import judge_log, judge_runs, judge_settling, judge_vibration, without_cut
-from trihedron.segment.means import PoseMeans, average_poses
-from trihedron.segment.noise import MeanNoise, pool_mean_noise
+from trihedron.segment.means import PoseMeans, average_poses, noise_of_poses
+from trihedron.segment.noise import pool_mean_noise
 from trihedron.segment.runs import (
     SWAY_RAD,
     EdgeNoise,
@@ -131,13 +131,13 @@ def _averaged(
     """Segments of the ``channels``, which are without the settling if there is any."""
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
     pooled = steady or [r for run in runs for r in run.quiet_ranges()]
-    noise = pool_mean_noise(channels, pooled) if pooled else MeanNoise(*np.zeros((3, channels.mean.shape[1])))
+    noise = noise_of_poses(channels, runs)
     poses = tuple(_pose(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
     moves = tuple(_move(k, *near) for k, near in enumerate(pairwise(zip(poses, runs, strict=True))))
     means = average_poses(recording, channels, runs, poses, noise)
     white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
-    found = judge_runs(recording, channels, runs, poses, noise) + judge_log(recording, channels, len(runs))
+    found = judge_runs(recording, channels, runs, poses, noise.common) + judge_log(recording, channels, len(runs))
     if settling is not None:
         means = settling.without(means)
         found.append(judge_settling(settling, means))
