@@ -151,6 +151,16 @@ def delivered(tick, period, delay_s, grid_s, seed):
     return timestamps if grid_s == 0.0 else np.floor(timestamps / grid_s + 1e-6) * grid_s
 
 
+@pytest.mark.parametrize("ppm", [5, 70, -70, 3000])
+@pytest.mark.parametrize("rate_hz", [25.0, 50.0, 100.0, 250.0, 500.0])
+def test_whole_milliseconds_of_a_clock_near_them_are_rounded_however_seldom_one_is_skipped(rate_hz, ppm):
+    true_s = (1.0 + 1e-6 * ppm) * np.arange(int(200 * rate_hz)) / rate_hz
+    clock = find_even_clock(np.round(true_s, 3))
+    assert clock.kind is TimestampKind.ROUNDED
+    # One step of a millisecond in 200 s does not tell where the line between lies.
+    assert np.ptp(clock.even_s - true_s) < 5e-4
+
+
 @pytest.mark.parametrize("grid_s", [0.0, 1e-3, 2e-3])
 @pytest.mark.parametrize("length", [3, 12, 40, 100])
 @pytest.mark.parametrize(("rate_hz", "delay_s"), [(100.0, 3e-3), (100.0, 1e-3), (104.0, 2e-3), (200.0, 1e-3)])

@@ -83,7 +83,10 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         period = _long_run(time_s, counter)
     else:
         period, tick, pauses, moved_back = track(time_s, period, width, is_seen, found.coherence > 0.9, room)
-    even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, width, False, room)
+    # Rounding to a grid moves a difference of two timestamps by its step / √6 rms, at any lag.
+    rounding = found.grid_s / np.sqrt(6.0) if is_seen and found.grid_s < period else 0.0
+    unseen = max(UNSEEN * period, rounding)
+    even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, (width, unseen), False, room)
     error = _error(time_s, even)
     for _ in range(3 if counter is None and is_seen else 0):
         # The fit is coarse here, because the clock must not follow the dip from a loss that is counted too early.
@@ -91,20 +94,18 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         if moved is tick:
             break
         tick = moved
-        even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, width, False, room)
+        even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, (width, unseen), False, room)
         error = _error(time_s, even)
     if drifts:
-        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, width, False, room, CLOSE_PIECES)
+        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, (width, unseen), False, room, CLOSE_PIECES)
         error = _error(time_s, even)
-    # Rounding to a grid moves a difference of two timestamps by its step / √6 rms, at any lag.
-    rounding = found.grid_s / np.sqrt(6.0) if is_seen and found.grid_s < period else 0.0
-    growth = _growth(error, pauses, max(UNSEEN * period, rounding))
+    growth = _growth(error, pauses, unseen)
     if moved_back > TAKEN_BACK or growth > GROWTH or (not is_seen and growth > 0.5 * GROWTH):
         return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
     kind = _kind(error, period, found.grid_s)
     if kind is not TimestampKind.LATE:
         # For two-sided errors the clock is at their middle, not at their edge.
-        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, width, True, room, CLOSE_PIECES)
+        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, (width, unseen), True, room, CLOSE_PIECES)
         error = _error(time_s, even)
     rms = _core.errors_deviation(error)
     even = _error(time_s, error)
@@ -134,7 +135,7 @@ def _lay(
     tick: IntArray,
     period: float,
     pauses: IntArray,
-    least: int,
+    least_of: tuple[int, float],
     through_middle: bool,
     room: FloatArray,
     pieces: int = 12,
@@ -142,7 +143,9 @@ def _lay(
     """The even clock (n,) fitted to the earliest timestamps, or to the middle of all; its mean period over the longest
     section and the standard error of that; whether its rate drifts, which is then followed in ``pieces``.
 
-    A block has at least ``least`` rows; the clock is written into ``room`` (n,)."""
+    ``least_of``: rows of a block, and deviation [s] below which the rate does not drift. The clock is written into
+    ``room`` (n,)."""
+    least, unseen = least_of
     late = lateness(time_s, tick, period, room)
     # Each section of the clock overwrites the lateness from which it is computed.
     even = late
@@ -171,7 +174,7 @@ def _lay(
         size = min(max(len(y) // 12, 5), 401) | 1
         smooth = _core.running_median(left, size)
         # The rate drifts if the smoothed residual is far larger than the scatter of the blocks explains.
-        curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), UNSEEN * period)
+        curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), unseen)
         course = None
         if curved and len(y) >= 24:
             drifts = True

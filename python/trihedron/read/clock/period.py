@@ -17,6 +17,13 @@ LOWEST, HIGHEST = 0.8, 1.9
 """Frequencies searched, per mean distance of rows: up to 45 % of all samples may be lost."""
 GRID_HIGHEST = 16.0
 """Highest frequency of a grid of timestamps, per mean distance of rows; a finer grid has no effect."""
+DIGIT = 1e-6
+"""Resolution [s] of a step: seconds since 1970 have it as double precision."""
+FINEST, ON_GRID = 0.015, 0.02
+"""Finest grid among the steps, in usual steps: rounding to a finer one is no error of a clock. Largest deviation of a
+step from whole grid steps."""
+MOST_STEPS = 1 << 20
+"""Rows whose steps are compared."""
 LINE, LINE_HELD = 0.98, 0.9
 """Power of a phase sum, and of that of its eighth multiple, above which all timestamps are multiples of one step."""
 LEAST = 1e-4
@@ -67,7 +74,7 @@ def find_period(time_s: FloatArray) -> Period:
     threshold = chdtri(2 * len(windows), CHANCE) / chdtri(2 * len(windows), 0.5)
     spectrum = _Spectrum(power, mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
-    grid = mean_step / line if line else 0.0
+    grid = _grid_of_steps(time_s[:MOST_STEPS]) or (mean_step / line if line else 0.0)
     best = _choose(spectrum, line)
     if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_TIMESTAMPS:
         return Period(mean_step, 0.0, grid, False)
@@ -78,6 +85,18 @@ def find_period(time_s: FloatArray) -> Period:
     if grid and abs(grid - period) < 0.02 * grid:
         grid = 0.0  # the period itself
     return Period(period, float(np.sqrt(power[k])), grid, True)
+
+
+def _grid_of_steps(time_s: FloatArray) -> float:
+    """Grid of which all steps are multiples, by their least difference; 0 where there is none, or only a finer one.
+
+    On a grid of 1 ms steps of 20 ms at 50.001 Hz are equal but for one in a thousand: the phase sum shows no grid.
+    """
+    step = np.unique(np.rint(np.diff(time_s) / DIGIT)) * DIGIT
+    grid = float(np.diff(step).min()) if len(step) > 1 else 0.0
+    is_other = not FINEST * float(np.median(np.diff(time_s))) <= grid <= (1.0 + ON_GRID) * float(step[step > 0.0].min())
+    miss = step / max(grid, DIGIT)
+    return 0.0 if is_other or float(np.abs(miss - np.rint(miss)).max()) > ON_GRID else grid
 
 
 @dataclass(frozen=True, eq=False)
