@@ -139,6 +139,18 @@ def test_a_strong_quadratic_of_a_gyro_is_no_cubic_as_well():
     assert all(abs(one.value) < 4.0 * one.std for name, one in sizes.items() if name.startswith("cubic"))
 
 
+def test_a_gyro_with_another_scale_in_either_sense_is_no_parabola():
+    """Fitted by a quadratic and a cubic its S was 7 σ from the truth, and moves disagreed."""
+    effects = diagnosed("gyro-scale-nonlinearity", 3, asymmetry=[3e-3, 0.0, -3e-3]).effects
+    assert effects[0].id == "gyro-scale-nonlinearity"
+    # Asymmetries of 0.3 %, and a σ that resolves a tenth of them.
+    for one, true in zip(effects[0].parameters, (3e-3, 0.0, -3e-3), strict=True):
+        assert one.name.startswith("half_difference")
+        assert one.std < 5e-4
+        assert abs(one.value - true) < 4.0 * one.std
+    assert diagnosed_sizes([effects[0].to_dict()])[0][0][1]["asymmetry"][0] == effects[0].parameters[0].value
+
+
 def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter():
     recording, truth = simulated("gyro-scale-nonlinearity", 3, 16, c3=(3e-3, -3e-3, 3e-3))
     moved = with_scatter(recording, truth.poses, 0.07 * 131.0)

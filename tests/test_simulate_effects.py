@@ -53,8 +53,12 @@ STATIC = {
         1e-12,
     ),
     "gyro-scale-nonlinearity": (
-        {"c2": (1e-3, 0.0, 0.0), "c3": (0.0, 1e-3, -1e-4)},
-        lambda f, w, _t: (f, w + np.array([1e-3, 0, 0]) * w**2 + np.array([0, 1e-3, -1e-4]) * w**3),
+        {"c2": (1e-3, 0.0, 0.0), "c3": (0.0, 1e-3, -1e-4), "asymmetry": (0.0, 0.0, 1e-3)},
+        lambda f, w, _t: (
+            f,
+            (w + np.array([1e-3, 0, 0]) * w**2 + np.array([0, 1e-3, -1e-4]) * w**3)
+            * (1.0 + np.array([0, 0, 1e-3]) * np.sign(w)),
+        ),
         # Next order for |ω| < 5: the bridge's c3² ω⁵ and the suspension's 5 c2³ ω⁴, 5 c2 c3 ω⁴.
         1e-6 * 5.0**5,
     ),

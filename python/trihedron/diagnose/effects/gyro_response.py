@@ -36,7 +36,7 @@ class GyroGSensitivity(Effect):
 
 
 class GyroScaleNonlinearity(Effect):
-    """Cubic (odd), quadratic (even), or both, along each gyro's own axis."""
+    """Cubic (odd), quadratic (even), both, or another scale in either sense, along each gyro's own axis."""
 
     id = "gyro-scale-nonlinearity"
     needs_moves = True
@@ -46,7 +46,7 @@ class GyroScaleNonlinearity(Effect):
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
         # 1 % of the fastest rate.
         fastest = max(float(np.abs(context.axis_rate).max()), LEAST_RATE)
-        per = {"c": 0.01 / fastest**2, "q": 0.01 / fastest}
+        per = {"c": 0.01 / fastest**2, "q": 0.01 / fastest, "h": 0.01}
         return np.array([per[name[0]] for name in variant.names])
 
     def variants(self, context: Context) -> list[Variant]:
@@ -57,4 +57,5 @@ class GyroScaleNonlinearity(Effect):
             Variant(on_axes(context, GYRO, w**3), c, cu, label="cubic"),
             Variant(on_axes(context, GYRO, w**2), q, qu, label="quadratic"),
             Variant(on_axes(context, GYRO, w**3, w**2), c + q, cu + qu, label="both"),
+            Variant(on_axes(context, GYRO, np.abs(w)), per_axis("half_difference"), ("1",) * 3, label="asymmetry"),
         ]

@@ -210,8 +210,8 @@ def _of_electronics(scenario: Scenario, name: Sensor, prefix: str) -> Noted:
             linear, quadratic = getattr(part.thermal, f"{kind}_per_k"), getattr(part.thermal, f"{kind}_per_k2")
             if any(linear) or any(quadratic):
                 yield f"{prefix}-thermal-{kind}", {"per_k": linear, "per_k2": quadratic, "logged": temperature.logged}
-    if any(part.asymmetry):
-        yield f"{prefix}-scale-asymmetry", {"asymmetry": part.asymmetry}
+    if any(part.asymmetry) and prefix == "accel":  # a gyro's is one of its nonlinearities
+        yield "accel-scale-asymmetry", {"asymmetry": part.asymmetry}
     if any(part.drift.amplitude):
         yield f"{prefix}-bias-drift", {"amplitude": part.drift.amplitude, "tau_s": part.drift.tau_s}
     if any(part.drift.change):

@@ -96,8 +96,9 @@ def diagnosed_g_sensitivity(values: Parameters, _variant: str) -> Size:
     return {"matrix": tuple(tuple(values.get(f"G_{i}{j}", 0.0) for j in AXES) for i in AXES)}
 
 
-def gyro_nonlinearity(scenario: Scenario, c2: Values = 0.0, c3: Values = 0.0) -> Scenario:
-    # ω + c2 ω² + c3 ω³; the deflection is 1/1000 of the gap per rad/s unless the bridge alone makes the cubic.
+def gyro_nonlinearity(scenario: Scenario, c2: Values = 0.0, c3: Values = 0.0, asymmetry: Values = 0.0) -> Scenario:
+    # ω + c2 ω² + c3 ω³, gain 1 ± asymmetry in either sense; the deflection is 1/1000 of the gap per rad/s unless the
+    # bridge alone makes the cubic.
     quadratic, cubic = triple(c2), triple(c3)
     deflection, second, third = [0.0] * 3, [0.0] * 3, [0.0] * 3
     for k in range(3):
@@ -109,7 +110,8 @@ def gyro_nonlinearity(scenario: Scenario, c2: Values = 0.0, c3: Values = 0.0) ->
     mode = replace(
         scenario.gyroscope.sense_mode, deflection_s_rad=triple(deflection), second=triple(second), third=triple(third)
     )
-    return replace(scenario, gyroscope=replace(scenario.gyroscope, sense_mode=mode))
+    electronics = replace(scenario.gyroscope.electronics, asymmetry=triple(asymmetry))
+    return replace(scenario, gyroscope=replace(scenario.gyroscope, sense_mode=mode, electronics=electronics))
 
 
 EFFECTS: Effects = {
@@ -119,7 +121,7 @@ EFFECTS: Effects = {
     "lever-arm": (lever_arm, axes(arm_m="r")),
     "accel-size-effect": (size_effect, diagnosed_places),
     "gyro-g-sensitivity": (g_sensitivity, diagnosed_g_sensitivity),
-    "gyro-scale-nonlinearity": (gyro_nonlinearity, axes(c2="quadratic", c3="cubic")),
+    "gyro-scale-nonlinearity": (gyro_nonlinearity, axes(c2="quadratic", c3="cubic", asymmetry="half_difference")),
 }
 
 
@@ -149,8 +151,10 @@ def noted(scenario: Scenario) -> Noted:
     gyro, mode = scenario.gyroscope, scenario.gyroscope.sense_mode
     if mode.bandwidth_hz:
         yield "sensor-lag", {"sense_mode": (mode.bandwidth_hz, mode.quality)}
-    if any(mode.deflection_s_rad):
-        pairs = [response(mode.deflection_s_rad[k], mode.second[k], mode.third[k]) for k in range(3)]
-        yield "gyro-scale-nonlinearity", {"c2": triple([p[0] for p in pairs]), "c3": triple([p[1] for p in pairs])}
+    two_scales = gyro.electronics.asymmetry
+    if any(mode.deflection_s_rad) or any(two_scales):
+        own = zip(mode.deflection_s_rad, mode.second, mode.third, strict=True)
+        c2, c3 = (triple(one) for one in zip(*(response(*axis) for axis in own), strict=True))
+        yield "gyro-scale-nonlinearity", {"c2": c2, "c3": c3, "asymmetry": two_scales}
     if any(any(row) for row in gyro.g_sensitivity):
         yield "gyro-g-sensitivity", {"matrix": gyro.g_sensitivity}
