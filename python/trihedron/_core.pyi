@@ -294,6 +294,7 @@ def settling_of_poses(
     gravity_m_s2: float,
     step_s: float,
     fewest: int,
+    certain: float,
 ) -> tuple[float, float, FloatArray, FloatArray, FloatArray] | None: ...
 def common_time_variance(
     time_s: FloatArray,

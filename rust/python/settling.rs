@@ -25,7 +25,7 @@ type Moving<'py> = (f64, f64, Ends<'py>, Ends<'py>, Bound<'py, PyArray2<f64>>);
 /// `(h, 3)` white; `up` `(h, 3)`; `spans` `(h, 2)` of the poses, then from the end of the move before to the beginning of
 /// the next.
 #[pyfunction]
-#[pyo3(signature = (readings, scale, noise, up, spans, *, gravity_m_s2, step_s, fewest))]
+#[pyo3(signature = (readings, scale, noise, up, spans, *, gravity_m_s2, step_s, fewest, certain))]
 #[expect(
     clippy::too_many_arguments,
     reason = "two sensors and their poses by name"
@@ -40,6 +40,7 @@ fn settling_of_poses<'py>(
     gravity_m_s2: f64,
     step_s: f64,
     fewest: usize,
+    certain: f64,
 ) -> PyResult<Option<Moving<'py>>> {
     let [rate, force] = [flat3("rate", &readings[0])?, flat3("force", &readings[1])?];
     let [of_rate, of_force] = [flat3("noise", &noise[0])?, flat3("noise", &noise[1])?];
@@ -58,7 +59,7 @@ fn settling_of_poses<'py>(
             gravity: gravity_m_s2,
             step: step_s,
         };
-        settling::settling(&poses, fewest)
+        settling::settling(&poses, fewest, certain)
     })?;
     let Some(found) = found else { return Ok(None) };
     let of_poses = |of: fn(&PoseMotion) -> [Vector3<f64>; 2]| {

@@ -19,6 +19,8 @@ const SETTLES_S: [f64; 4] = [0.7, 1.4, 2.8, 5.6];
 const N_SIZES: usize = 31;
 const SMALLEST: f64 = 0.1;
 const LARGEST: f64 = 1e4;
+/// Of these the first that exceed no error of a pose: scatter that 1/f noise explains.
+const BY_NOISE: usize = 7;
 /// Variance of a tilt about the vertical, of the largest, that is rounding.
 const LEVEL: f64 = 1e-9;
 
@@ -46,7 +48,8 @@ pub struct Poses<'a> {
 /// Settling beside scatter.
 #[derive(Debug, Clone)]
 pub struct Settling {
-    /// Twice the log-likelihood that it gains over scatter, less the cost of the time constants tried.
+    /// Twice the log-likelihood that it gains beside scatter, less the cost of the time constants tried; scatter is what
+    /// noise explains unless more is certain.
     pub score: f64,
     /// The same score of a bias that settles, over scatter or the support, whichever is likelier; or that by which
     /// gravity prefers it to a rotation of any course, whichever is less.
@@ -79,11 +82,11 @@ struct Parts {
 ///
 /// `s` and `k` are drawn anew in every pose, with one variance for all axes. The accelerometer shows the part of `k`
 /// across the vertical, the shape in time all of it. One bias `z` for the session, restricted likelihood. `None` with
-/// fewer poses than `fewest`.
+/// fewer poses than `fewest`. Scatter beyond that by noise is certain where it gains as much as `certain`.
 ///
 /// # Errors
 /// `BadInput` when lengths differ.
-pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
+pub fn settling(poses: &Poses<'_>, fewest: usize, certain: f64) -> Result<Option<Settling>> {
     let n = poses.spans.len();
     if poses.up.len() != n || poses.edges.len() != n || poses.noise.iter().any(|one| one.len() != n)
     {
@@ -96,14 +99,10 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
     // Of a mean over a pose.
     let error = |one: &Parts| (3.0 / one.of_rate.trace() / N_BLOCKS as f64).sqrt();
     let unit = median(&mut all.iter().map(error).collect::<Vec<f64>>());
-    let size =
-        |k: usize| SMALLEST * (LARGEST / SMALLEST).powf((k - 1) as f64 / (N_SIZES - 1) as f64);
     let variance = |k: usize| {
-        if k == 0 {
-            0.0
-        } else {
-            (unit * size(k)).powi(2)
-        }
+        let share = (k as f64 - 1.0) / (N_SIZES - 1) as f64;
+        let size = SMALLEST * (LARGEST / SMALLEST).powf(share);
+        if k == 0 { 0.0 } else { (unit * size).powi(2) }
     };
     let sums = |tilts: f64| {
         SETTLES_S.map(|tau| {
@@ -113,30 +112,34 @@ pub fn settling(poses: &Poses<'_>, fewest: usize) -> Result<Option<Settling>> {
         })
     };
     let [of_support, of_bias] = [1.0, 0.0].map(sums);
-    let of_scatter = |a: usize| log_likelihood(&of_support[0], variance(a), 0.0);
-    let scatter = (0..=N_SIZES)
-        .map(of_scatter)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let tried: Vec<(usize, usize, usize)> = (0..SETTLES_S.len())
-        .flat_map(|t| (0..=N_SIZES).flat_map(move |a| (0..=N_SIZES).map(move |b| (t, a, b))))
-        .collect();
     // With the rate at the beginning of poses and its time constant.
-    let likeliest = |tables: &[Vec<Sums>]| {
+    let likeliest = |tables: &[Vec<Sums>; SETTLES_S.len()], most: usize, settles: usize| {
+        let tried: Vec<(usize, usize, usize)> = (0..SETTLES_S.len())
+            .flat_map(|t| (0..=most).flat_map(move |a| (0..=settles).map(move |b| (t, a, b))))
+            .collect();
         let found = tried.par_iter().map(|&(t, a, b)| {
             let value = log_likelihood(&tables[t], variance(a), variance(b));
             (value, variance(b).sqrt(), SETTLES_S[t])
         });
-        found.reduce_with(|one, other| if other.0 > one.0 { other } else { one })
+        let best = found.reduce_with(|one, other| if other.0 > one.0 { other } else { one });
+        best.unwrap_or((f64::NEG_INFINITY, 0.0, SETTLES_S[0]))
     };
-    let (Some(support), Some(bias)) = (likeliest(&of_support), likeliest(&of_bias)) else {
-        return Ok(None);
+    let any = likeliest(&of_support, N_SIZES, N_SIZES);
+    let by_noise = likeliest(&of_support, BY_NOISE, N_SIZES);
+    // Biases scatter by what noise explains unless more is certain beside a support.
+    let (support, most) = if 2.0 * (any.0 - by_noise.0) > certain {
+        (any, N_SIZES)
+    } else {
+        (by_noise, BY_NOISE)
     };
+    let without = likeliest(&of_support, most, 0).0;
+    let bias = likeliest(&of_bias, N_SIZES, N_SIZES);
     let score = |most: f64, other: f64| 2.0 * (most - other - (SETTLES_S.len() as f64).ln());
     let seen: Vec<Option<Seen>> = (0..n).map(|i| seen(poses, i)).collect();
     let of_bias: f64 = seen.iter().flatten().map(|one| one.of_bias).sum();
     Ok(Some(Settling {
-        score: score(support.0, scatter),
-        of_bias: score(bias.0, scatter.max(support.0)).min(2.0 * of_bias),
+        score: score(support.0, without),
+        of_bias: score(bias.0, any.0).min(2.0 * of_bias),
         motion: motions(poses, seen, support.1, support.2),
     }))
 }

@@ -1,6 +1,6 @@
 //! Rotation of the sensor inside its poses: mean rate by gravity, shape by the gyro (docs/diagnosis-method.md, 8.7f).
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::{N_BLOCKS, Poses, mean};
 use crate::order_statistics::median;
@@ -163,9 +163,13 @@ pub(super) fn seen(poses: &Poses<'_>, i: usize) -> Option<Seen> {
         part[0] += tilt;
         part[1] += tilt - here;
     }
-    let [as_bias, as_motion] =
-        [0, 1].map(|of| bends(&parts.map(|part| part[of] * (N_BLOCKS as f64 / n as f64))));
     let lasts = n as f64 * poses.step;
+    let [as_bias, as_motion] = [0, 1].map(|of| {
+        let means = parts.map(|part| part[of] * (N_BLOCKS as f64 / n as f64));
+        let chi2 = bends(&means, of_tilt, of as f64 * of_rate * lasts * lasts);
+        // Heavy tails: the tail of a move is neither motion at rest nor bias.
+        (0.5 * DEGREES + (N_BLOCKS - 2) as f64) * (chi2 / DEGREES).ln_1p()
+    });
     let rate = slope * (12.0 / ((n as f64).powi(3) * poses.step));
     let curve = at_edges.map(|here| here - sum / n as f64);
     (rate + curve[0])
@@ -179,21 +183,29 @@ pub(super) fn seen(poses: &Poses<'_>, i: usize) -> Option<Seen> {
                 12.0 * of_tilt / (lasts * lasts) + 0.2 * of_rate,
                 of_rate * lasts * lasts / 12.0,
             ],
-            of_bias: 0.5 * (as_motion - as_bias) / (N_BLOCKS as f64 * of_tilt),
+            of_bias: as_motion - as_bias,
         })
 }
 
-/// Sum of squares of the parts of a pose about a straight line.
-fn bends(parts: &[Vector3<f64>; N_BLOCKS]) -> f64 {
-    let at = |k: usize| k as f64 - 0.5 * (N_BLOCKS as f64 - 1.0);
-    let mean = parts.iter().sum::<Vector3<f64>>() / N_BLOCKS as f64;
-    let spread: f64 = (0..N_BLOCKS).map(|k| at(k) * at(k)).sum();
-    let slope: Vector3<f64> = parts
-        .iter()
-        .enumerate()
-        .map(|(k, part)| part * (at(k) / spread))
-        .sum();
-    let each = parts.iter().enumerate();
-    each.map(|(k, part)| (part - mean - slope * at(k)).norm_squared())
-        .sum()
+/// χ² of the parts of a pose about a straight line: even noise, `of_mean` the variance of the mean over the pose, and a
+/// random walk, of variance `walked` over the pose.
+fn bends(parts: &[Vector3<f64>; N_BLOCKS], of_mean: f64, walked: f64) -> f64 {
+    let covariance = SMatrix::<f64, N_BLOCKS, N_BLOCKS>::from_fn(|i, j| {
+        let at = |within: f64| walked * (i.min(j) as f64 + within) / N_BLOCKS as f64;
+        if i == j {
+            of_mean * N_BLOCKS as f64 + at(1.0 / 3.0)
+        } else {
+            at(0.5)
+        }
+    });
+    let read = SMatrix::<f64, N_BLOCKS, 3>::from_fn(|i, axis| parts[i][axis]);
+    let second = SMatrix::<f64, { N_BLOCKS - 2 }, N_BLOCKS>::from_fn(|i, j| {
+        [1.0, -2.0, 1.0]
+            .get(j.wrapping_sub(i))
+            .copied()
+            .unwrap_or(0.0)
+    });
+    let bent = second * read;
+    let half = (second * covariance * second.transpose()).cholesky();
+    half.map_or(0.0, |half| bent.dot(&half.solve(&bent)))
 }

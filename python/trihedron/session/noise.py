@@ -156,6 +156,8 @@ def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray)
 QUIET = 0.3
 """Quantile over the poses of the change between halves: slow noise is in all poses alike, a bias that jumps only in
 some."""
+QUARTERS, FEWEST_OF_QUARTER = 4, 3
+"""Parts of a pose whose bend shows its slow noise, and the readings that each has at least."""
 MAY_EXCEED = 2.5
 """Largest ratio of the colour of all poses to that of the quiet ones, whose quantile is good to a factor of two."""
 
@@ -192,13 +194,18 @@ def _quiet(halves: FloatArray, white: FloatArray) -> FloatArray:
 def quiet_errors(readings: FloatArray, spans: IntArray, white: FloatArray) -> FloatArray:
     """(poses, 3) standard errors of the means over ``spans`` (poses, 2): those by white noise alone, ``white``, with
     the slow noise that the quiet poses have: a motion is larger in some. At least that of all axes together: a quantile
-    of few poses is uncertain, and noise below a filter's corner exceeds that of the samples on all axes alike."""
-    long = spans[:, 1] - spans[:, 0] >= FEWEST_READINGS
+    of few poses is uncertain, and noise below a filter's corner exceeds that of the samples on all axes alike.
+
+    Quarters show it by their bend, which has the error of a change between halves: where every support yields no pose
+    is quiet, but a motion that decays is mostly a slope.
+    """
+    long = spans[:, 1] - spans[:, 0] >= FEWEST_OF_QUARTER * QUARTERS
     if not long.any():
         return white
-    halves, white_long = half_changes(readings, spans[long]), white[long]
-    of_all = _quiet(halves.reshape(-1, 1), white_long.reshape(-1, 1))
-    return white * np.maximum(np.maximum(_quiet(halves, white_long), of_all), 1.0)
+    steps, white_long = _steps(readings, spans[long], np.eye(3)[None], QUARTERS), white[long]
+    bends = 0.5 * (steps[:, 2] - steps[:, 0])
+    of_all = _quiet(bends.reshape(-1, 1), white_long.reshape(-1, 1))
+    return white * np.maximum(np.maximum(_quiet(bends, white_long), of_all), 1.0)
 
 
 # Bias scatter from pose to pose by 1/f noise, estimated from inside the poses (docs/model-session.md, 11.12d).

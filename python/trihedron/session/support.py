@@ -10,19 +10,23 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Pose
-from trihedron.session.joints import STRONG
 from trihedron.session.noise import FEWEST_POSES, SessionNoise, quiet_errors
 from trihedron.session.rounding import UNIFORM, undithered_axes
+
+CERTAIN = 2.0 * math.log(99.0)
+"""Twice the logarithm of the odds at which biases that scatter are certain beside a support: those at which they are
+named."""
 
 
 @dataclass(frozen=True, eq=False)
 class Support:
     """Motion of the sensor with its support inside the poses.
 
-    ``score``: twice the log-likelihood that it gains over biases that scatter, less the cost of the time constants
-    tried; ``of_bias`` the same of a bias that settles, as far as gravity prefers it. ``rate`` (h, 2, 3): mean rate of
-    every pose by the motion and its variance, rad/s; ``leans`` (h, 2, 3): change of the vertical from the mean over a
-    pose to the end of the move before and to the beginning of the next; ``edge_variance`` (h, 2) rad² of that rotation.
+    ``score``: twice the log-likelihood that it gains over biases that scatter, by noise unless more is certain beside
+    it, less the cost of the time constants tried; ``of_bias`` the same of a bias that settles, as far as gravity
+    prefers it. ``rate`` (h, 2, 3): mean rate of every pose by the motion and its variance, rad/s; ``leans`` (h, 2, 3):
+    change of the vertical from the mean over a pose to the end of the move before and to the beginning of the next;
+    ``edge_variance`` (h, 2) rad² of that rotation.
     """
 
     score: float
@@ -33,8 +37,8 @@ class Support:
 
     @property
     def yields(self) -> bool:
-        """Whether it does, by strong evidence: neither biases that scatter nor a bias that settles explain as much."""
-        return self.score > max(2.0 * math.log(STRONG), self.of_bias)
+        """Whether it is likelier than not that it does, and no bias that settles instead is certain."""
+        return self.score > 0.0 and self.of_bias < CERTAIN
 
     def turns(self, before: int, gyro_S: FloatArray) -> FloatArray:
         """Variance (3,) of the integral of the rate over the move after a pose, (raw unit · s)², by its two ends."""
@@ -71,6 +75,6 @@ def support_of(
         errors.append(quiet_errors(raw, spans, np.sqrt(density**2 / (n * step_s)[:, None] + rounding)))
     found = _core.settling_of_poses(
         readings, near[:2], (errors[0], errors[1]), near[2],
-        (spans, np.sort(edges, axis=1)), gravity_m_s2=gravity_m_s2, step_s=step_s, fewest=FEWEST_POSES,
+        (spans, np.sort(edges, axis=1)), gravity_m_s2=gravity_m_s2, step_s=step_s, fewest=FEWEST_POSES, certain=CERTAIN,
     )  # fmt: skip
     return None if found is None else Support(*found)
