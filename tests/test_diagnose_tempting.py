@@ -13,8 +13,9 @@ from confidence.motion import Step, attitude, move
 from confidence.sensor import read_out, recorded
 from confidence.sessions import directions
 from diagnosed_session import unit_of
-from trihedron.diagnose.effects.timing_jitter import SURE, common_time_variance
+from trihedron.diagnose.effects.timing_jitter import common_time_variance
 from trihedron.diagnose.session.observations import observe
+from trihedron.probability import SURE
 from trihedron.simulate import Environment, Temperature, hand_session, simulate, with_effect
 
 WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))

@@ -8,8 +8,9 @@ import trihedron
 from confidence.motion import G
 from confidence.sensor import DEG, lower, recorded
 from confidence.sessions import hand
-from trihedron.diagnose.effects.timing_jitter import SURE, common_time_variance
+from trihedron.diagnose.effects.timing_jitter import common_time_variance
 from trihedron.diagnose.session.observations import observe
+from trihedron.probability import SURE
 
 FINE_HZ = 1000
 MEAN, POLE = (np.ones(4) / 4, [1.0]), ([0.72], [1.0, -0.28])

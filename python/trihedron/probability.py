@@ -66,6 +66,12 @@ def ndtri(below: float) -> float:
     return -_core.normal_upper(below)
 
 
+CLEAR = 3.0
+"""Standard errors from which a figure clearly differs: by chance once in 370."""
+SURE = ndtri(1.0 - 0.5 * RARE_ALARM)
+"""The same (3.9) of a figure that is asked at many places."""
+
+
 def bdtrc(count: float, trials: float, chance: float) -> float:
     """Probability of more than ``count`` successes in ``trials`` with success probability ``chance``."""
     return _core.binomial_above(count, trials, chance)

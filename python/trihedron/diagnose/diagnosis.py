@@ -215,8 +215,6 @@ def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> 
 
 POSE_DOMAINS = ("static-accel", "moves", "dynamics")
 """Domains that compare the model with gravity or zero velocity: without them nothing can contradict it."""
-LEAST_DOF = 1.0
-"""Degrees of freedom below which the fit has used up a domain's rows."""
 
 
 def _explained(answer: Answer, of_samples: Sequence[DomainTest]) -> list[DomainTest]:
@@ -243,6 +241,6 @@ def verdict_of(answer: Answer, *, has_relations: bool, is_determined: bool) -> V
     if has_relations or any(d.disagrees for d in answer.domains):
         return "unexplained"
     # A weak prior fills undetermined directions; rows that it alone determines test nothing.
-    if not is_determined or not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in answer.domains):
+    if not is_determined or not any(d.domain in POSE_DOMAINS for d in answer.domains):
         return "not-testable"
     return "consistent"

@@ -26,12 +26,9 @@ from trihedron.diagnose.candidates import (
 )
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.effects.contract import SENSORS, Effect
 from trihedron.diagnose.hypothesis import Hypothesis, again, without_each
 from trihedron.diagnose.relations.search import Related, related
-
-N_SENSORS = 2
-"""Processes that may be replaced by effects: one of either sensor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +72,8 @@ def search(base: Hypothesis, alpha: float, effects: Sequence[Effect] | None = No
     or exchanged if that is better."""
     one = _Search(alpha, catalogue() if effects is None else effects)
     found = one.concluded(one.added(base))
-    for _ in range(N_SENSORS):
+    # One process of either sensor may be replaced by effects.
+    for _ in SENSORS:
         instead = one.instead_of_a_process(found)
         if instead is None:
             break

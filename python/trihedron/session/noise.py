@@ -8,7 +8,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
-from trihedron.probability import MEDIAN_CHI2, ndtri
+from trihedron.probability import CLEAR, MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
 from trihedron.records.calibration import Calibration
 from trihedron.records.recording import Recording
@@ -215,8 +215,6 @@ PARTS = 8
 FEWEST_POSES = 6
 """Fewer poses do not separate two processes (drift, scatter, settling) on three axes."""
 FEWEST_READINGS = 4 * PARTS
-FAR = 9.0
-"""Squares beyond so many variances are disturbances by hand, not noise."""
 SEEN = 1.0
 """Standard errors by which the mean square of halves must exceed white noise: low, as it only widens uncertainties."""
 
@@ -272,7 +270,8 @@ def _steps(readings: FloatArray, spans: IntArray, along: FloatArray, n: int) -> 
 
 def _mean_square(x: FloatArray) -> float:
     squares = x**2
-    near = squares <= FAR * np.median(squares) / MEDIAN_CHI2[1]
+    # Changes far beyond are disturbances by hand, not noise.
+    near = squares <= CLEAR**2 * np.median(squares) / MEDIAN_CHI2[1]
     return float(np.mean(squares[near]))
 
 

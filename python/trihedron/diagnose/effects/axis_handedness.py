@@ -5,11 +5,10 @@ import numpy as np
 from trihedron.arrays import AXES, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence, per_axis_parameters
+from trihedron.probability import SURE
 from trihedron.records.domains import Where
 from trihedron.sensor_model import order_and_reversed
 
-SIGN_SIGMA = 5.0
-"""Standard errors between a scale and zero from which its sign counts: wrong by chance in one of 3.5 million axes."""
 CERTAIN = 1e6
 """Gain that ranks it before every effect: with a mirrored axis nothing else can be judged."""
 
@@ -27,7 +26,7 @@ class AxisHandedness(DirectEffect):
         main, sigma = np.argmax(np.abs(S), axis=0), sigmas_of(context.fitted.covariance())[9:18].reshape(3, 3)
         largest = S[main, range(3)]
         # The sign of an axis is used only where its scale is determined.
-        if (np.abs(largest) < SIGN_SIGMA * sigma[main, range(3)]).any():
+        if (np.abs(largest) < SURE * sigma[main, range(3)]).any():
             return None
         if found is None:
             # A rotation by any angle is part of S; a reflection is not, whatever the angle.

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray, sigmas_of
+from trihedron.arrays import AXES, TINY, FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Distortion, stacked
@@ -31,8 +31,6 @@ class Side(NamedTuple):
 
 TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
 """3 mg and 0.1 °/s: typical errors of consumer parts."""
-LEAST_RMS = 1e-12
-"""Smallest rms of a column, so that a column of zeros does not divide by zero."""
 ACCELEROMETER, GYRO = 0, 1
 SENSORS = (Side("accelerometer", "accel", "m/s^2"), Side("gyro", "gyro", "rad/s"))
 NOWHERE = Where()
@@ -113,7 +111,7 @@ class Effect:
         for side, typical in ((variant.distortion.force, TYPICAL_M_S2), (variant.distortion.rate, TYPICAL_RAD_S)):
             if side is not None:
                 rms = np.sqrt(np.einsum("nik,nik->k", side, side) / len(side))
-                out = np.minimum(out, typical / np.maximum(rms, LEAST_RMS))
+                out = np.minimum(out, typical / np.maximum(rms, TINY))
         return out
 
     def unavailable(self, context: Context) -> str | None:
@@ -153,7 +151,7 @@ class Effect:
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
         """Sentence for an effect selected by the search: the mechanism with its most significant parameter."""
         linear = [p for p in parameters if p.name not in SHAPE_NAMES]
-        strongest = max(linear, key=lambda p: abs(p.value) / max(p.std, LEAST_RMS))
+        strongest = max(linear, key=lambda p: abs(p.value) / max(p.std, TINY))
         return self.reported(
             "strongest", mechanism=self.mechanism, name=strongest.name, value=strongest.value, std=strongest.std,
             unit=strongest.unit,

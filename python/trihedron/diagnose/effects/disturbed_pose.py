@@ -14,6 +14,7 @@ from trihedron.diagnose.effects.contract import (
 )
 from trihedron.diagnose.residuals.within_poses import LOUD, loud_poses, pose_scatter
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import LEAST_P, RARE_ALARM, SURE
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
@@ -21,15 +22,10 @@ from trihedron.session.model import STATIC_ACCEL
 
 MOST = 0.25
 """Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""
-OWN_SIGMA = 4.0
-"""Deviation of a pose's own readings, in sigma, from which a disturbance of it is considered."""
 BUMP_SIGMA = 7.0
 """Deviation of a 0.1 s mean from the line through its surroundings, in sigma: drift inside a pose stays below it."""
 FEWEST_BLOCKS = 4
 """Blocks of 0.1 s that a pose must have: two on either side determine the line."""
-SHAKES_P = 1e-6
-"""p-value of a pose's variance, corrected for the number of poses and channels, below which the pose vibrates: 48
-healthy sessions stay above 0.02, and real noise is not as white."""
 OUTLYING = 0.25
 """Weight of a move below which its residual is in the tails: χ² above 32 with five degrees of freedom, p = 10⁻⁵."""
 IN_EITHER_HALF = 0.5
@@ -71,7 +67,7 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
 def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     """Poses that vibrate throughout, and how the level of one half predicts the other half, against the usual level."""
     scatter = pose_scatter(obs)
-    loud = loud_poses(obs) < SHAKES_P
+    loud = loud_poses(obs) < RARE_ALARM
     x = obs.readings
     found, before, after = [], [], []
     for i in np.flatnonzero(loud.any(axis=1)):
@@ -96,11 +92,11 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     poses, free = fitted.system.segment[rows], 1.0 - fitted.leverage[rows]
     chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_poses)
     dof = np.maximum(np.bincount(poses, free, minlength=obs.n_poses), LEAST_DOF)
-    out: npt.NDArray[np.bool_] = chi2 > OWN_SIGMA**2 * dof
+    out: npt.NDArray[np.bool_] = chi2 > SURE**2 * dof
     for change, sigma in zip(obs.half_changes, (obs.pose_force_sigma, obs.pose_rate_sigma), strict=True):
         if change is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
-            out |= (np.abs(change) > 2.0 * OWN_SIGMA * sigma).any(axis=1)
+            out |= (np.abs(change) > 2.0 * SURE * sigma).any(axis=1)
     before, after = obs.move_poses[fitted.core.tails < OUTLYING].T
     out[np.intersect1d(before, after)] = True
     return out
@@ -140,7 +136,7 @@ class DisturbedPose(DirectEffect):
         )  # fmt: skip
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
-            1e-30, strength, parameters, statement, "within-static",
+            LEAST_P, strength, parameters, statement, "within-static",
             Where((), obs.pose_names(restless), spans), held, share=min(len(spans) / obs.n_poses, 1.0),
         )  # fmt: skip
 

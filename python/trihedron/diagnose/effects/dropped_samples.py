@@ -13,17 +13,16 @@ from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.diagnose.session.inserted_samples import insert_samples, moved, with_inserted
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
+from trihedron.probability import CLEAR, chdtri
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.joints import joints, most_lost
 from trihedron.session.model import Prior, SessionState
 
-CLEAR_COUNT = 3.0
-"""Standard errors by which a count must differ from zero."""
 UNSETTLED = 0.15
 """Relative error of a count determined only by joining the two sides of the gap."""
-MEDIAN_OF_FIVE = 4.35
-"""Median of a chi-square with five degrees of freedom: a move has five rows."""
+ROWS = 5
+"""Rows of a move: gravity after it, velocity over it."""
 CONTRADICTS, FEWEST_MOVES = 10.0, 3
 """Misfit, in medians of all moves, above which a move contradicts the session: by chance one in thirty million."""
 MOST_OF_INTERVALS = 0.02
@@ -113,7 +112,7 @@ def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[
     whole = _same_moves(obs, {one.sample: one.count for one in losses if one.is_certain})
     clean = _of_moves_that_agree(whole.without_moves(touched), context.fitted.state, context.fitted.prior)
     misfit = (move_residuals(whole, clean) ** 2).sum(axis=1)
-    usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / MEDIAN_OF_FIVE, 1.0)
+    usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / chdtri(ROWS, 0.5), 1.0)
     counted: list[Loss] = []
     sigmas: dict[int, float] = {}
     for m in range(obs.n_moves):
@@ -161,7 +160,7 @@ class _Move:
     def _fall(self, more: Sequence[Loss], fewer: Sequence[Loss]) -> float:
         """By how much the misfit is less with ``more``, in units of what remains of it and of that of the others."""
         best = self.misfit(more)
-        return (self.misfit(fewer) - best) / max(best / 5.0, self.usual)
+        return (self.misfit(fewer) - best) / max(best / ROWS, self.usual)
 
     def _best(self, own: list[Loss], k: int) -> Loss:
         best, least = own[k], self.misfit(own)
@@ -180,7 +179,7 @@ class _Move:
         beside = [
             self.misfit([*others, replace(one, count=n)]) - best for n in (one.count - 1, one.count + 1) if n >= 1
         ]
-        return float(max(0.3, np.sqrt(max(best / 5.0, 1.0) / max(float(np.mean(beside)), 1e-3))))
+        return float(max(0.3, np.sqrt(max(best / ROWS, 1.0) / max(float(np.mean(beside)), 1e-3))))
 
 
 def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | None) -> SessionState:
@@ -205,7 +204,7 @@ class DroppedSamples(DirectEffect):
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)
         # A jolt looks like a loss; gravity then gives a count of zero, or one that is not significant.
-        losses = [loss for loss in losses if loss.count > CLEAR_COUNT * sigmas[loss.sample]]
+        losses = [loss for loss in losses if loss.count > CLEAR * sigmas[loss.sample]]
         if not losses:
             return None
         obs = context.obs

@@ -6,9 +6,11 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from trihedron.arrays import FloatArray
+from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, acting_on
 from trihedron.gravity import EARTH_RATE_RAD_S
+from trihedron.probability import chdtri
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 from trihedron.units import degrees_from_radians
@@ -21,8 +23,8 @@ STATED = "stated_vertical"
 """Parameter of a log without Earth rate: the vertical component that the session model subtracts."""
 KNOWN = 1e-4
 """Error of the stated latitude [rad], some hundred metres on the ground."""
-MISSES = 6.63
-"""χ² of the vector's length, one degree of freedom, p = 0.01: above it the vector is not Earth rate."""
+MISSES = chdtri(1, FALSE_ALARM)
+"""χ² of the vector's length above which it is not Earth rate."""
 
 
 @dataclass(frozen=True)

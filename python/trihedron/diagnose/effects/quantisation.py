@@ -10,20 +10,17 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import FALSE_ALARM, RARE_ALARM
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
-from trihedron.session.rounding import before_adc
+from trihedron.session.rounding import TWO_CODES, UNIFORM, before_adc
 
 COARSE = 0.45
 """Noise, in LSB, below which readings take two or three codes and their mean follows a staircase."""
-RARE, FALSE_ALARM = 0.01, 1e-6
-"""Chance that a code is empty, below which it is tested; and that as many of those tested are."""
 MOST_CODES = 0.2
 """Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
 FEWEST_CODES = 2
 """Codes that show an LSB: static readings of a coarse ADC may take only two."""
-REACHES = 0.5
-"""Noise, in LSB, at which a third of the readings leave their code, so that neighbouring codes are expected."""
 MOSTLY = 0.5
 """Share of the static readings on one code from which a dead zone around it is tested."""
 ZONE_STEPS, JUST_OUTSIDE = 3.5, 20
@@ -62,7 +59,7 @@ class Lattice:
     @property
     def added(self) -> float:
         """Variance that the codes add to a reading."""
-        return self.step**2 * (self.shifted if self.missing else 1.0 / 12.0)
+        return self.step**2 * (self.shifted if self.missing else UNIFORM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +81,8 @@ def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> Missing
     codes = np.unique(values)
     if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
         return None
-    if sigma <= REACHES * step:
+    # Neighbouring codes are expected of noise by which a third of the readings leave their code.
+    if sigma**2 <= TWO_CODES * step**2:
         return NONE_MISSING
     # Gap by gap: over hundreds of codes a relative error of 0.1 % of the step would add up to a whole code.
     place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(np.int64)
@@ -103,9 +101,9 @@ def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> Missing
         squares[inside] += (between / len(one)) ** 2
     # As many readings as both neighbours have, a third of them on the code itself: the binomial chance of none.
     chance = (2.0 / 3.0) ** (2.0 * min(float(np.median(independent)), 1.0) * expected)
-    is_tested = chance < RARE
+    is_tested = chance < FALSE_ALARM
     missing = is_tested & ~is_visited
-    if not missing.any() or pdtrc(np.count_nonzero(missing) - 1.0, chance[is_tested].sum()) > FALSE_ALARM:
+    if not missing.any() or pdtrc(np.count_nonzero(missing) - 1.0, chance[is_tested].sum()) > RARE_ALARM:
         return NONE_MISSING
     # Between all of them up and all down: uniform.
     error = float(np.sqrt(squares[missing].sum() / len(poses) / 3.0))
@@ -189,7 +187,7 @@ class Quantisation(DirectEffect):
             density = obs.force_density if c < 3 else obs.rate_density
             assert density is not None
             variance = density[c % 3] ** 2 * obs.recording.rate_hz
-            sigma = float(np.sqrt(max(variance - step**2 / 12.0, variance / 2.0)))
+            sigma = float(np.sqrt(max(variance - UNIFORM * step**2, variance / 2.0)))
             error = np.full(len(poses), missing.error * step)
             return Lattice(c, step, sigma, sigma, np.zeros(len(poses)), error, missing.number, missing.share)
         if scatter > NOISE_ENOUGH * step:
@@ -240,7 +238,7 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     mean[:, k] += one.mean_shift
     sigma[:, k] = np.hypot(sigma[:, k] * min(one.sigma / max(one.scatter, one.sigma), 1.0), one.mean_sigma)
     # In motion the readings cross many codes: the rounding error is white, of variance LSB²/12 per reading.
-    density[k] = np.sqrt((one.sigma**2 + one.step**2 / 12.0) / obs.recording.rate_hz)
+    density[k] = np.sqrt((one.sigma**2 + UNIFORM * one.step**2) / obs.recording.rate_hz)
     if is_accel and obs.force_up is not None:
         # Change of the variance along the vertical.
         up, error = obs.force_up

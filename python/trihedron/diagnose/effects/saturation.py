@@ -11,7 +11,7 @@ from trihedron.channel_facts.possible_limits import REACH
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
-from trihedron.probability import LEAST_P
+from trihedron.probability import CLEAR, LEAST_P
 from trihedron.records.channel_facts import Limit
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
@@ -22,11 +22,9 @@ HALF_WINDOW = 6
 """Samples on either side of an interval that determine the local motion."""
 NEAR_LIMIT = 0.97
 """Share of a limit above which a move is excluded, on any axis: the limit belongs to the sensor, not to one axis."""
-BEYOND, N_SIGMA = 0.1, 3.0
-"""Least share of the parabola on a plateau by which the motion exceeds the limit, by so many standard errors: one of
-constant rate does not."""
-ONE_CODE = 1e-30
-"""Chance that a part without a limit repeats one code at the end of its range."""
+BEYOND = 0.1
+"""Least share of the parabola on a plateau by which the motion clearly exceeds the limit: one of constant rate does
+not."""
 ABOVE_REST = 1.2
 """Poses and gentle moves alike come close to a range limit below 1.2 g."""
 
@@ -104,7 +102,8 @@ class _Saturation(DirectEffect):
         statement = self.reported(
             "plateaus", plateaus=len(runs), samples=_n_samples(runs), touched=len(touched), moves=obs.n_moves
         )
-        p = max(min(float(np.exp(-gain)), ONE_CODE if any(run.is_rail for run in runs) else 1.0), LEAST_P)
+        # A part without a limit does not repeat one code at the end of its range.
+        p = LEAST_P if any(run.is_rail for run in runs) else max(min(float(np.exp(-gain)), 1.0), LEAST_P)
         return Evidence(
             p, -2.0 * np.log(p), self._limits(context, runs, sigma), statement, "moves" if is_gyro else "dynamics",
             Where(channels, obs.move_names(touched[:8]), times),
@@ -131,7 +130,7 @@ class _Saturation(DirectEffect):
         sides = (None, column) if self.sensor == GYRO else (column, None)
         core = context.fitted.core
         (plain, *_), (beyond, _, size, variance) = core.evidence([NOTHING, (*sides, [1.0])], [core.strengths], ANYTHING)
-        return float(beyond - plain) if size[0] - N_SIGMA * np.sqrt(variance[0, 0]) > BEYOND else 0.0
+        return float(beyond - plain) if size[0] - CLEAR * np.sqrt(variance[0, 0]) > BEYOND else 0.0
 
     def _si(self, context: Context) -> tuple[FloatArray, FloatArray, FloatArray]:
         """SI per raw unit along each axis, the SI value of a centred raw reading of zero, and the origin."""

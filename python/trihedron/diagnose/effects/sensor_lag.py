@@ -14,6 +14,7 @@ from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axes, per_axis
 from trihedron.diagnose.session.solve import Distortion
+from trihedron.probability import CLEAR
 from trihedron.records.diagnosis import EffectParameter
 
 TIMES_S = (0.004, 0.016, 0.064)
@@ -22,8 +23,6 @@ NEAR_ONE = (0.6, 1.6)
 """Range of a confirmed parameter: outside it another time of the grid fits better, or the mechanism does not."""
 LEAST_STEPS = 0.25
 """In sample intervals: a shorter time constant decays by e⁻⁴ within a sample, and its column is that of a delay."""
-SIGMAS = 3.0
-"""Standard errors by which a lag may be negative: filters are causal."""
 AXES_S = 0.01
 """s: unit of the columns of single axes; their parameters are lags in hundredths of a second."""
 SMOOTHING_SIGMA = (0.6, 1.0)
@@ -34,7 +33,7 @@ SEPARATE, DELAYS, BOTH = "per axis", ", without smoothing", "smoothing_of_both"
 
 def is_near_one(value: FloatArray, covariance: FloatArray) -> bool:
     """Whether a scaled parameter is near one, within three standard errors."""
-    sigma = SIGMAS * float(np.sqrt(max(float(covariance[0, 0]), 0.0)))
+    sigma = CLEAR * float(np.sqrt(max(float(covariance[0, 0]), 0.0)))
     return bool(NEAR_ONE[0] - sigma < value[0] < NEAR_ONE[1] + sigma)
 
 
@@ -94,7 +93,7 @@ class SensorLag(_Late):
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         if SEPARATE in variant.label:
-            return bool((value > -SIGMAS * sigmas_of(covariance)).all() and (value > 0.0).any())
+            return bool((value > -CLEAR * sigmas_of(covariance)).all() and (value > 0.0).any())
         return super().is_plausible(variant, value, covariance)
 
 

@@ -8,6 +8,7 @@ from scipy.special import chdtrc, ndtr, stdtrit
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence
+from trihedron.probability import CLEAR, SURE
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.records.words import why_not
@@ -106,7 +107,7 @@ class TableTilt(TableEffect):
         p, tilts = float(chdtrc(2 * len(found), chi2)), np.degrees(change / gain)
         tilt = float(weights @ tilts)
         error = _error_of_mean(tilts, gain**2, np.degrees(sigmas / gain))
-        if tilt < ORDINARY_DEG or tilt < 3.0 * error:
+        if tilt < ORDINARY_DEG or tilt < CLEAR * error:
             return None
         return Evidence(
             p, chi2, (EffectParameter("tilt", tilt, max(error, 1e-4), "deg"),),
@@ -116,8 +117,6 @@ class TableTilt(TableEffect):
 
 LEAST_RAD = 1e-3
 """Error of an angle by the stop and the feet, a twentieth of a degree."""
-OFF_SIGMA = 4.0
-"""Deviation in sigma from which a rotation is named: by chance one of 16 000."""
 
 
 class TurnAngleError(TableEffect):
@@ -131,7 +130,7 @@ class TurnAngleError(TableEffect):
         z = errors / sigmas
         chi2 = float((z**2).sum())
         p = float(chdtrc(len(z), chi2))
-        bad = np.flatnonzero(np.abs(z) > OFF_SIGMA)
+        bad = np.flatnonzero(np.abs(z) > SURE)
         if len(bad) == 0:
             return None
         names = context.obs.move_names([turns[k].move for k in bad])

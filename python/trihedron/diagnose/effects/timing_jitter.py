@@ -11,10 +11,9 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import SURE
 from trihedron.records.diagnosis import EffectParameter
 
-SURE = 4.0
-"""Standard errors of the common variance: 3·10⁻⁵ by chance; at most 2.9 in 48 sessions without jitter beyond it."""
 ORDINARY = 0.01
 """Jitter, in sample intervals, below which the motion may cause it: where its acceleration jumps, no order is free."""
 

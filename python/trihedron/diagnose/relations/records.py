@@ -11,11 +11,9 @@ from trihedron.diagnose.relations.rotations import NOT_TURNED
 from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import WORLD_VECTOR
 from trihedron.gravity import EARTH_RATE_RAD_S
+from trihedron.probability import CLEAR
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.words import relation_experiment, relation_resembles, words
-
-WORLD_SIGMAS = 3.0
-"""Standard uncertainties within which a coupling is that of Earth rate."""
 
 
 def records(found: Related) -> tuple[Relation, ...]:
@@ -76,7 +74,7 @@ def _of_world_vector(_one: Follows, value: FloatArray, covariance: FloatArray, s
     sigma = np.std([k for k, _ in drawn], axis=0)
     spread = float(np.std([angle for _, angle in drawn]))
     away = min(float((np.abs(coupling - s * EARTH_RATE_RAD_S * np.eye(3)) / sigma).max()) for s in (1.0, -1.0))
-    family = "earth" if away < WORLD_SIGMAS else "world"
+    family = "earth" if away < CLEAR else "world"
     return Relation(
         sensor="gyroscope",
         depends_on=(WORLD_VECTOR,),

@@ -7,7 +7,7 @@ from scipy.special import fdtrc
 
 from trihedron.arrays import FloatArray, rms_of
 from trihedron.diagnose.session.solve import Fit
-from trihedron.probability import f_upper
+from trihedron.probability import CLEAR, f_upper
 from trihedron.records.domains import DOMAINS, Domain, DomainTest, Where
 from trihedron.sensor_model import axis_scales
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
@@ -23,8 +23,8 @@ N_DOMAINS_TESTED = float(len(DOMAINS))
 """Four domains of poses and moves, two of samples: they share the false-alarm rate."""
 LEAST_DOF = 0.5
 """Degrees of freedom below which the fit has used up a domain."""
-HEAVY, CARRIES = 9.0, 0.2
-"""A segment beyond three sigma, and a channel with a fifth of the misfit, are named as its location."""
+CARRIES = 0.2
+"""A channel with a fifth of the misfit is named as its location."""
 
 _CHANNELS = {domain: CHANNELS[3:] if domain in (STATIC_GYRO, MOVES) else CHANNELS[:3] for domain in ROW_DOMAINS}
 
@@ -89,7 +89,7 @@ def locate(fitted: Fit, label: int) -> Where:
     squared = system.residual[rows] ** 2
     segments = system.segment[rows]
     per_segment = {int(s): float(squared[segments == s].sum()) for s in np.unique(segments)}
-    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > HEAVY][:5]
+    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > CLEAR**2][:5]
     per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
     names = _CHANNELS[label]
     channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > CARRIES * per_channel.sum())

@@ -9,13 +9,14 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import CLEAR
 from trihedron.quantiles import medians
 from trihedron.ranges import Range
 from trihedron.records.diagnosis import EffectParameter, Relation
 from trihedron.records.words import relation_experiment, relation_resembles, words
+from trihedron.session.noise import FEWEST_POSES
+from trihedron.session.rounding import undithered_axes
 
-FEWEST_POSES = 6
-"""Fewer poses do not show which noise is usual."""
 ORDERS = (2, 1)
 """Differences of readings whose variances are compared: the second for the level, because motion is slow; the first
 shows with it whether the spectrum is that of noise."""
@@ -35,13 +36,9 @@ USUAL_SHARE = 0.1
 SAME_SHAPE = np.log(1.3)
 """Largest difference between the ratios of both variances, in their logarithm: a hand or a support that vibrates has
 most of its power in the first differences."""
-DITHERED = 0.5
-"""Noise, in LSB, below which its variance depends on the place inside an LSB."""
 LEAST_RATIO = 2.0
 """Variance over the usual one from which a change is named, or its inverse: noise of a part changes by a factor of two
 over a hundred kelvin."""
-CLEAR = 3.0
-"""Standard errors by which the noise of an axis differs, or that of a move may be below the level."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +107,8 @@ def _change(obs: Observations, sensor: int, poses: list[list[Range]], moves: lis
     if len(usable) < FEWEST_POSES:
         return None
     usual = np.array([medians(variance[usable, k]) for k in range(2)])
-    axes = np.flatnonzero((usual[1] > (DITHERED * steps) ** 2) & (variance[usable].min(axis=(0, 1)) > 0.0))
+    is_coarse = undithered_axes(steps, np.sqrt(usual[1]))
+    axes = np.flatnonzero(~is_coarse & (variance[usable].min(axis=(0, 1)) > 0.0))
     if not len(axes):
         return None
     logs = np.log(variance[usable][:, :, axes] / usual[:, axes])

@@ -12,7 +12,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.noise_level import noise_changes
 from trihedron.diagnose.session.observations import Observations
-from trihedron.probability import LEAST_P
+from trihedron.probability import LEAST_P, RARE_ALARM
 from trihedron.records.domains import DomainTest, Where
 
 MIN_LINE_SHARE = 0.03
@@ -76,7 +76,7 @@ def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
 
 
 @lru_cache(maxsize=4)
-def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
+def find_lines(obs: Observations, p_limit: float = RARE_ALARM) -> list[Line]:
     """Lines above the smooth spectrum of the poses, at most one per channel."""
     pieces = pose_pieces(obs)
     times = [obs.time_s[a : a + len(piece)] for a, piece in pieces]

@@ -13,15 +13,13 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
-from trihedron.probability import MEDIAN_CHI2
+from trihedron.probability import CLEAR, MEDIAN_CHI2
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import Change, Prior, SessionReadings, SessionState
 from trihedron.session.noise import along_gradient, half_changes, measure_noise
 from trihedron.session.support import Support, support_of
 
-FAR = 3.0
-"""Usual errors beyond which a change inside a pose is a disturbance by hand, not noise."""
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
 have an uncertainty of a fifth."""
@@ -178,8 +176,8 @@ def _whitening(change: FloatArray, white: FloatArray) -> FloatArray:
     with np.errstate(invalid="ignore", divide="ignore"):
         z = np.nan_to_num(np.abs(change / white), posinf=0.0)
     usual = np.maximum(np.median(z, axis=0) / np.sqrt(MEDIAN_CHI2[1]), 1.0)
-    shown = np.sqrt((np.minimum(z, FAR * usual) ** 2).mean(axis=0))
-    error = white * np.maximum(np.maximum(shown, 1.0), z / FAR)
+    shown = np.sqrt((np.minimum(z, CLEAR * usual) ** 2).mean(axis=0))
+    error = white * np.maximum(np.maximum(shown, 1.0), z / CLEAR)
     return np.where(z > 0.0, 1.0 / np.maximum(error, TINY), 0.0)
 
 
