@@ -88,15 +88,17 @@ def compensate(
     zero = np.zeros((recording.n_samples, 3))
     read_f = zero if raw_f is None else raw_f @ S_f.T + b_f
     read_w = zero if raw_w is None else raw_w @ S_w.T + b_w
-    t, every = recording.time_s, np.arange(recording.n_samples)
-    obs = SimpleNamespace(recording=recording, time_s=t, pose_time_s=t[:0], raw_rate=raw_w, raw_force=raw_f, n_poses=0)
+    t, none = recording.time_s, SimpleNamespace(poses=())
+    obs = SimpleNamespace(
+        recording=recording, segments=none, time_s=t, pose_time_s=t[:0], raw_rate=raw_w, raw_force=raw_f, n_poses=0,
+        move_ranges=((0, len(t)),),
+    )  # fmt: skip
     state = SimpleNamespace(accel_S=S_f, gyro_S=S_w)
     left_out: dict[str, str] = {}
     force, rate = read_f, read_w
     for _ in range(N_ITERATIONS):
-        path = SimpleNamespace(force=force, rate=rate, move_slices=(slice(0, len(every)),), point_samples=every)
-        fitted = cast(Fit, SimpleNamespace(path=path, state=state, obs=obs))
-        context = SampleContext(fitted, reference=references)
+        core = SimpleNamespace(path=lambda moved=(rate, force, None): moved)
+        context = SampleContext(cast(Fit, SimpleNamespace(core=core, state=state, obs=obs)), reference=references)
         force, rate = read_f, read_w
         for entry in effects:
             variant = _variant(entry, context, left_out)

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import convolve1d, uniform_filter1d
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.slope import slope_of
@@ -25,9 +24,10 @@ LEAST_SWING_V = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """Signals at the points of the session (one per pose, then every sample of every move), SI, body frame.
+    """Signals at the *points* of the session (one per pose, then every sample of every move), SI, body frame.
 
-    Everything is computed from the fitted session when first used.
+    Everything is computed from the fitted session, its motion corrected by S, b and the effects (eq. 11.3), when first
+    used.
     """
 
     fitted: Fit
@@ -39,21 +39,28 @@ class Context:
     # -- time and layout ------------------------------------------------------------------------------------------
     @property
     def n_points(self) -> int:
-        return len(self.fitted.path.force)
-
-    @property
-    def moves(self) -> tuple[slice, ...]:
-        return self.fitted.path.move_slices
+        return len(self.force)
 
     @cached_property
-    def move_edges(self) -> npt.NDArray[np.int64]:
+    def move_edges(self) -> IntArray:
         """(moves, 2) first point of each move and one past its last."""
-        return np.array([(where.start, where.stop) for where in self.moves], dtype=np.int64).reshape(-1, 2)
+        ends = self.obs.n_poses + np.cumsum([0, *(stop - start for start, stop in self.obs.move_ranges)])
+        return np.stack([ends[:-1], ends[1:]], axis=1)
+
+    @cached_property
+    def moves(self) -> tuple[slice, ...]:
+        return tuple(slice(*ends) for ends in self.move_edges.tolist())
+
+    @cached_property
+    def point_samples(self) -> IntArray:
+        """(points,) index of the sample."""
+        mid = np.array([(pose.start + pose.stop) // 2 for pose in self.obs.segments.poses], dtype=np.int64)
+        return np.concatenate([mid, *(np.arange(*ends) for ends in self.obs.move_ranges)])
 
     @cached_property
     def time_s(self) -> FloatArray:
         """(points,) middle of each pose, time of each sample."""
-        times = self.obs.time_s[self.fitted.path.point_samples]
+        times = self.obs.time_s[self.point_samples]
         times[: self.obs.n_poses] = self.obs.pose_time_s
         return times
 
@@ -63,15 +70,24 @@ class Context:
         return np.asarray((self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], TINY))
 
     # -- motion ---------------------------------------------------------------------------------------------------
-    @property
-    def force(self) -> FloatArray:
-        """(points, 3) specific force: exactly g along the fitted vertical in poses."""
-        return self.fitted.path.force
+    @cached_property
+    def _motion(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self.fitted.core.path()
 
     @property
     def rate(self) -> FloatArray:
         """(points, 3) angular rate: zero in poses."""
-        return self.fitted.path.rate
+        return self._motion[0]
+
+    @property
+    def force(self) -> FloatArray:
+        """(points, 3) specific force: exactly g along the fitted vertical in poses."""
+        return self._motion[1]
+
+    @property
+    def turned(self) -> FloatArray:
+        """(points, 3, 3) rotation since the move began."""
+        return np.concatenate([np.tile(np.eye(3), (self.obs.n_poses, 1, 1)), self._motion[2]])
 
     def derivative(self, values: FloatArray) -> FloatArray:
         """(points, 3) time derivative inside moves; zero in poses."""
@@ -86,11 +102,6 @@ class Context:
         return _core.move_shifted(self.time_s, values, self.move_edges, ahead_s)
 
     @cached_property
-    def force_rate(self) -> FloatArray:
-        """(points, 3) derivative of specific force."""
-        return self.derivative(self.force)
-
-    @cached_property
     def angular_acceleration(self) -> FloatArray:
         """(points, 3) derivative of angular rate."""
         return self.derivative(self.rate)
@@ -98,10 +109,9 @@ class Context:
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
         """(points, 3) minus gravity in the body, propagated by the gyro from each move's start; ``force`` in poses."""
-        path, state, h = self.fitted.path, self.fitted.state, self.obs.n_poses
-        out = self.force.copy()
+        out, up, turned = self.force.copy(), self.fitted.state.up, self.turned
         for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
-            out[where] = state.gravity * path.attitude[where.start - h : where.stop - h] @ state.up[before]
+            out[where] = self.fitted.state.gravity * turned[where] @ up[before]
         return out
 
     @cached_property
@@ -158,7 +168,7 @@ class Context:
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
         """Values of a whole-recording signal (n, ...) at the points: pose means, then move samples."""
-        out = np.array(samples[self.fitted.path.point_samples], dtype=np.float64)
+        out = np.array(samples[self.point_samples], dtype=np.float64)
         out[: self.obs.n_poses] = self.obs.pose_means(samples)
         return out
 
@@ -280,7 +290,7 @@ class Context:
 
         Poses that no chain of moves reaches have NaN but for the vertical, which gravity shows.
         """
-        obs, state, path = self.obs, self.fitted.state, self.fitted.path
+        obs, up, turned = self.obs, self.fitted.state.up, self.turned
         out = np.full((obs.n_poses, 3, 3), np.nan)
 
         def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
@@ -288,22 +298,20 @@ class Context:
             x /= np.linalg.norm(x)
             return np.stack([x, np.cross(up, x), up], axis=1)
 
-        up = state.up
         out[:, :, 2] = up
         out[0] = levelled(np.eye(3)[np.abs(up[0]).argmin()], up[0])
         for where, (before, after) in zip(self.moves, obs.move_poses, strict=True):
             if np.isfinite(out[before]).all():
-                turned = path.attitude[where.stop - 1 - obs.n_poses] @ out[before]
-                out[after] = levelled(turned[:, 0], up[after])
+                out[after] = levelled(turned[where.stop - 1] @ out[before][:, 0], up[after])
         return out
 
     @cached_property
     def attitude(self) -> FloatArray:
         """(points, 3, 3) :attr:`pose_attitude`, in moves rotated on by the gyro from the pose before."""
-        poses, path, h = self.pose_attitude, self.fitted.path, self.obs.n_poses
-        out = np.concatenate([poses, np.zeros((self.n_points - h, 3, 3))])
+        poses, out = self.pose_attitude, self.turned
+        out[: len(poses)] = poses
         for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
-            out[where] = path.attitude[where.start - h : where.stop - h] @ poses[before]
+            out[where] = out[where] @ poses[before]
         return out
 
     @cached_property

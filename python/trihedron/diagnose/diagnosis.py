@@ -1,7 +1,7 @@
 """The diagnosis of recordings: locate the disagreement, search for missing effects, fit them, test the improvement."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from types import MappingProxyType
 
@@ -14,8 +14,8 @@ from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import renewed, with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.dropped_samples import DroppedSamples
-from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_variance
+from trihedron.diagnose.effects.contract import Evidence
+from trihedron.diagnose.effects.timing_jitter import common_time_variance
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import records
 from trihedron.diagnose.relations.search import Related
@@ -144,7 +144,7 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
     # The same bounds of noise as beside the effects: what these do not explain is not cleared by them.
     plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
-    of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.rejected)
+    of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.found.values())
     domains = _disagreeing((*judge_rows(plain.fitted, alpha), *of_samples), settles)
     notify(0.3, "letting effects compete")
     bare = hypothesis(observed.obs, observed.fitted.state, prior)
@@ -191,17 +191,15 @@ def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, floa
     )
 
 
-def _judge_timing(context: Context, alpha: float, rejected: Collection[str]) -> DomainTest:
+def _judge_timing(context: Context, alpha: float, every: Iterable[Evidence]) -> DomainTest:
     """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests.
 
-    ``rejected`` ids of effects that did not improve the prediction of held-out moves: jolts look like lost samples.
+    ``every`` evidence in the samples that improves the prediction of held-out moves: jolts look like lost samples.
     """
     value, spread, n = common_time_variance(context.obs)
     if not np.isfinite(spread):
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
-    looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in rejected]
-    found = [evidence for look in looks if (evidence := look.find(context)) is not None]
-    z = value / spread
+    found, z = [one for one in every if one.domain == "timing"], value / spread
     p = min([min(1.0, 2.0 * e.p_value) for e in found], default=float(min(1.0, max(2.0 * ndtr(-z), 0.05))))
     where = Where(
         (), tuple(s for e in found for s in e.where.segments), tuple(t for e in found for t in e.where.times_s)

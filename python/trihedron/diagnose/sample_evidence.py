@@ -1,12 +1,12 @@
 """Effects detected by their own tests on the samples: each correction is kept only if it improves the prediction."""
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import MIN_FALL, DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, predict_held_out, tune_noise
@@ -36,13 +36,16 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Observations corrected for the effects detected in the samples, fitted in predicted noise; ``rejected``: ids of
-    effects whose correction did not improve the prediction of held-out moves."""
+    """Observations corrected for the effects detected in the samples, fitted in predicted noise.
+
+    ``found`` is the evidence of every test, by id of its effect, less that of effects whose correction did not improve
+    the prediction of held-out moves.
+    """
 
     bare: Observations
     fitted: Fit
     seen: tuple[Seen, ...] = ()
-    rejected: frozenset[str] = frozenset()
+    found: Mapping[str, Evidence] = field(default_factory=dict)
 
     @property
     def obs(self) -> Observations:
@@ -54,7 +57,7 @@ def look(
 ) -> tuple[Observed, dict[str, Candidate]]:
     """Observations corrected for every effect that its own test detects, and the result of every test."""
     candidates: dict[str, Candidate] = {}
-    found: list[tuple[DirectEffect, Evidence]] = []
+    found: dict[str, Evidence] = {}
     for effect in catalogue():
         if not isinstance(effect, DirectEffect):
             continue
@@ -65,11 +68,14 @@ def look(
         evidence = effect.find(context)
         if not effect.is_local or evidence is not None:
             candidates[effect.id] = Candidate(effect.id, 1.0 if evidence is None else evidence.p_value, True)
+        if evidence is not None:
+            found[effect.id] = evidence
+    observed = replace(observed, found=found)
+    for key, evidence in sorted(found.items(), key=lambda pair: -pair[1].strength):
+        effect = by_id()[key]
         # Half of the false-alarm rate is for these tests, half for the search.
-        if evidence is not None and evidence.p_value * len(catalogue()) < alpha / 2.0:
-            found.append((effect, evidence))
-    for effect, evidence in sorted(found, key=lambda pair: -pair[1].strength):
-        observed = _with_one(observed, effect, evidence, start)
+        if isinstance(effect, DirectEffect) and evidence.p_value * len(catalogue()) < alpha / 2.0:
+            observed = _with_one(observed, effect, evidence, start)
     return observed, candidates
 
 
@@ -81,7 +87,7 @@ def _with_one(observed: Observed, effect: DirectEffect, evidence: Evidence, star
         begin = fitted.state if obs.n_poses == observed.obs.n_poses else start
         fitted = tune_noise(obs, begin, fitted.prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.begins):
-            return replace(observed, rejected=observed.rejected | {effect.id})
+            return replace(observed, found={k: one for k, one in observed.found.items() if one is not evidence})
         gain = _explained(observed.fitted, fitted)
     return replace(observed, fitted=fitted, seen=(*observed.seen, Seen(effect, evidence, gain)))
 

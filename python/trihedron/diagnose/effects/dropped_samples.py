@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -19,8 +17,6 @@ from trihedron.records.domains import Where
 from trihedron.session.joints import joints, most_lost
 from trihedron.session.model import Prior, SessionState
 
-UNSETTLED = 0.15
-"""Relative error of a count determined only by joining the two sides of the gap."""
 ROWS = 5
 """Rows of a move: gravity after it, velocity over it."""
 CONTRADICTS, FEWEST_MOVES = 10.0, 3
@@ -41,15 +37,14 @@ class Loss:
     is_certain: bool
 
 
-@lru_cache(maxsize=8)
-def find_losses(obs: Observations) -> tuple[Loss, ...]:
+def find_losses(obs: Observations) -> list[Loss]:
     """Intervals where the motion on either side joins only if samples are inserted (eq. 8.16), move after move."""
     moves = np.array(obs.move_ranges, dtype=np.int64).reshape(-1, 2)
     found = joints(list(obs.whitened), obs.time_s, obs.recording.rate_hz, moves, clipped_samples(obs))
     owner = [int(np.flatnonzero((moves[:, 0] <= k) & (k < moves[:, 1]))[0]) for k in found.sample]
     each = zip(found.sample, owner, found.count, found.gain, found.is_certain, strict=True)
     losses = [Loss(int(k), m, int(count), 2.0 * float(gain), bool(sure)) for k, m, count, gain, sure in each]
-    return tuple(sorted(losses, key=lambda loss: loss.sample))
+    return sorted(losses, key=lambda loss: loss.sample)
 
 
 def _with_losses(obs: Observations, losses: dict[int, int]) -> Observations:
@@ -68,28 +63,18 @@ def _same_moves(obs: Observations, losses: dict[int, int]) -> Observations:
     return whole if whole.n_moves == obs.n_moves else obs
 
 
-_KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = WeakKeyDictionary()
-
-
 def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     """Losses with their counts, and the standard error of each count by its sample.
 
     The joint of the two sides of a gap gives the place and an approximate count. Gravity and zero velocity after the
     move determine the exact count, or show that nothing is missing, because a loss changes the integrated rotation. The
     session is fitted with those inserted that the motion alone decides, and without the moves that seem to have other
-    losses, half of all at the most, so that a loss cannot bias it. Computed once per set of observations.
+    losses, half of all at the most, so that a loss cannot bias it.
     """
-    if context.obs not in _KNOWN:
-        losses = list(find_losses(context.obs))
-        if context.obs.n_moves < 2 * FEWEST_MOVES or len(context.fitted.state.effect):
-            clear = [one for one in losses if one.is_certain]
-            _KNOWN[context.obs] = clear, {one.sample: 0.5 + UNSETTLED * one.count for one in clear}
-        else:
-            counted = _by_gravity(context, losses)
-            # Two losses close together are one joint that fits neither: the second shows once the first is inserted.
-            more = _beside(context.obs, counted[0])
-            _KNOWN[context.obs] = _by_gravity(context, [*counted[0], *more]) if more else counted
-    return _KNOWN[context.obs]
+    counted = _by_gravity(context, find_losses(context.obs))
+    # Two losses close together are one joint that fits neither: the second shows once the first is inserted.
+    more = _beside(context.obs, counted[0])
+    return _by_gravity(context, [*counted[0], *more]) if more else counted
 
 
 def _beside(obs: Observations, known: list[Loss]) -> list[Loss]:

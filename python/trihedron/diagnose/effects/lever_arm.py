@@ -37,11 +37,9 @@ class LeverArm(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         moves = [(where.start, where.stop) for where in _true_moves(context)]
-        n_poses, n = context.obs.n_poses, context.n_points
-        attitude = np.empty((n, 3, 3))
-        attitude[:n_poses], attitude[n_poses:] = np.eye(3), context.fitted.path.attitude
         found = _core.lever_arm_of_moves(
-            (context.time_s, context.rate, context.force, context.gravity_in_moves), attitude, np.array(moves),
+            (context.time_s, context.rate, context.force, context.gravity_in_moves), context.turned,
+            np.array(moves),
             smoothed=max(SMOOTHED, int(SMOOTHED_S * context.obs.recording.rate_hz)) | 1, fewest=FEWEST_MOVES,
         )  # fmt: skip
         if found is None:

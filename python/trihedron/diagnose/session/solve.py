@@ -36,7 +36,7 @@ FOLDS = 8
 class Distortion:
     """What effects add to the corrected readings, linear in their parameters: SI, body frame.
 
-    ``force`` and ``rate`` (points, 3, K) or None, at the points of ``Trajectory`` (poses, then move samples). Where
+    ``force`` and ``rate`` (points, 3, K) or None, at the points of a session (poses, then move samples). Where
     they change inside poses, (poses, 3, K) more: the mean over the second half of each less that over the first.
     """
 
@@ -80,22 +80,6 @@ def stacked(parts: list[Distortion]) -> Distortion:
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
-    """The motion of the session state at its *points*: one per pose, then every sample of every move.
-
-    ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by S, b and the accepted
-    effects; ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` the points of each move;
-    ``point_samples`` (points,) index of the sample.
-    """
-
-    force: FloatArray
-    rate: FloatArray
-    attitude: FloatArray
-    move_slices: tuple[slice, ...]
-    point_samples: npt.NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
 class System:
     """Whitened residuals of a fit and their labels, (rows,) each.
 
@@ -129,18 +113,6 @@ class Fit:
     def leverage(self) -> FloatArray:
         """(rows,) leverage of every row; the degrees of freedom of a block are the sum of 1 minus it."""
         return self.core.leverage()
-
-    @cached_property
-    def path(self) -> Trajectory:
-        """The motion at every point, corrected (eq. 11.3)."""
-        rate, force, attitude = self.core.path()
-        slices, first = [], self.obs.n_poses
-        for start, stop in self.obs.move_ranges:
-            slices.append(slice(first, first + stop - start))
-            first += stop - start
-        parts = [np.arange(start, stop) for start, stop in self.obs.move_ranges]
-        mid = np.array([(pose.start + pose.stop) // 2 for pose in self.obs.segments.poses], dtype=np.intp)
-        return Trajectory(force, rate, attitude, tuple(slices), np.concatenate([mid, *parts]))
 
     def bias(self, sensor: int) -> FloatArray:
         """(poses, 3) biases of the accelerometer (0) or the gyro (1), SI."""
