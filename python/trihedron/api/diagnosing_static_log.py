@@ -13,6 +13,7 @@ from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.records.diagnosis import LinearModel
 from trihedron.records.results import DiagnosisResult
+from trihedron.segment.static_pieces import static_pieces
 from trihedron.transforms import directions_of
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -94,7 +95,7 @@ def diagnosed_static_log(
 ) -> DiagnosisResult:
     """The diagnosis of a log of one or two orientations."""
     linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
-    found = diagnose_static_log(recording, linear, gravity[0], alpha)
+    found = diagnose_static_log(recording, static_pieces(recording), linear, gravity[0], alpha)
     lasts = float(recording.time_s[-1] - recording.time_s[0])
     few = Finding.of("not-fit", "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
     return DiagnosisResult(

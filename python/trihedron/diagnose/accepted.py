@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.arrays import TINY
+from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
 from trihedron.diagnose.candidates import Tried, wald_p
 from trihedron.diagnose.effects import by_id, catalogue
@@ -17,6 +17,7 @@ from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curve
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import NORMAL_95
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectCurve, EffectParameter, Stage, StageDomain
@@ -147,10 +148,7 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
         curves: tuple[EffectCurve, ...] = ()
         if one.effect.walks:
             path = one.alone.fitted.bias(one.effect.sensor)
-            extra["curve"] = {
-                "time_s": model.obs.pose_time_s.tolist(), "value": path.T.tolist(),
-                "sigma": [[float(s)] * model.obs.n_poses for s in one.std], "unit": one.effect.unit,
-            }  # fmt: skip
+            extra = series_of(model.obs, path, one.std, one.effect.unit)
             curves = bias_curves(model.context, one.effect.sensor, path, one.std, residuals)
         held = held_out_records(one.without, model)
         as_much = explain_as_much(one, model, answer.found.tried.values())
@@ -170,6 +168,12 @@ def _of_samples(answer: Answer) -> list[AcceptedEffect]:
         parameters = said.parameters if said.restate is None else said.restate(answer.numbers.context)
         out.append(effect_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
     return out
+
+
+def series_of(obs: Observations, path: FloatArray, sigma: FloatArray, unit: str) -> dict[str, Any]:
+    """The curve of a drifting bias, ``path`` (poses, 3) with standard uncertainties (3,), as the result states it."""
+    times, errors = obs.pose_time_s.tolist(), [[float(s)] * len(path) for s in sigma]
+    return {"curve": {"time_s": times, "value": path.T.tolist(), "sigma": errors, "unit": unit}}
 
 
 def effect_record(

@@ -13,7 +13,7 @@ import numpy as np
 
 from trihedron.arrays import AXES, TINY, FloatArray, IntArray, rms_of
 from trihedron.defaults import FALSE_ALARM
-from trihedron.diagnose.accepted import effect_record, tried_candidate
+from trihedron.diagnose.accepted import effect_record, series_of, tried_candidate
 from trihedron.diagnose.bias_strengths import BiasStrength, bias_strengths
 from trihedron.diagnose.candidates import wald_p
 from trihedron.diagnose.context import Context
@@ -28,44 +28,35 @@ from trihedron.diagnose.residuals.within_poses import judge_within_poses
 from trihedron.diagnose.search import Found, search
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Distortion
-from trihedron.records import Pose, Recording, Segments
+from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
+from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainResiduals, DomainTest, Where
 from trihedron.records.words import why_not
 from trihedron.sensor_model import axis_scales
-from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.session.model import LOWER, Prior
-from trihedron.transforms import directions_of
 from trihedron.units import rate_to_si
 
 DOMAINS: tuple[Domain, Domain] = ("static-accel", "static-gyro")
-N_PIECES, FEWEST_PIECES = 80, 24
-"""Pieces of a log, enough for both branches of a temperature cycle; and below which no curve is determined."""
-FEWEST_SAMPLES = 16
-"""Samples of a piece from which the standard error of its mean is known."""
-QUIET_QUANTILE, LOUD = 0.2, 4.0
-"""Variance of first differences over that of the quietest fifth, above which a piece is moving: the noise of a part
-changes by a factor of two over a hundred kelvin."""
-TURNS_RAD = 0.02
-"""Angle between the halves of a moving piece, at least: a bias that drifts by 0.1 g in a log causes a tenth of it."""
-MOSTLY_STILL = 0.6
-"""Share of a log that must be static: in one that moves, slow motion would count as static."""
-EXACT = 1e-6
-"""Relative prior σ of S, which converts sizes only."""
+Pieces = tuple[Segments, IntArray]
+"""Static pieces as poses, and the orientation (n,) of each."""
 
 
-def diagnose_static_log(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
+def diagnose_static_log(
+    recording: Recording, pieces: Pieces | None, model: LinearModel, gravity_m_s2: float, alpha: float
+) -> Diagnosis:
     """Biases against temperature and time, and spectral lines, of a log with too few orientations for a calibration.
 
-    ``model`` has nominal or given S, b of both sensors, used only for sizes in physical units.
+    ``pieces`` are none where too little of the log is static. ``model`` has nominal or given S, b of both sensors, used
+    only for sizes in physical units.
     """
-    pieces = static_pieces(recording)
     sides: list[_Side] = []
     within: list[tuple[DomainTest, AcceptedEffect | None]] = []
     tried = {effect.id: Candidate(effect.id, None, False, why_not("few-orientations")) for effect in catalogue()}
     if pieces is not None:
-        obs = observe(recording, pieces.segments)
-        sides = [_judged(obs, pieces, model, gravity_m_s2, k, alpha) for k in range(1 if obs.pose_rate is None else 2)]
+        obs = observe(recording, pieces[0])
+        n_sensors = 1 if obs.pose_rate is None else 2
+        sides = [_judged(obs, pieces[1], model, gravity_m_s2, k, alpha) for k in range(n_sensors)]
         within = [_lines(sides[-1].plain, obs, alpha)]
         of_lines = Candidate("periodic-interference", within[0][0].p_value, True)
         tried |= {one.id: one for one in (*(c for side in sides for c in side.candidates), of_lines)}
@@ -92,19 +83,6 @@ def diagnose_static_log(recording: Recording, model: LinearModel, gravity_m_s2: 
 
 
 @dataclass(frozen=True, eq=False)
-class StaticPieces:
-    """Static pieces of a log as poses; ``orientation`` (n,) of each, the most frequent first."""
-
-    segments: Segments
-    orientation: IntArray
-
-    def about_orientations(self, values: FloatArray) -> FloatArray:
-        """Values (n, ...) minus their mean in every orientation."""
-        level = np.array([values[self.orientation == k].mean(axis=0) for k in range(self.orientation.max() + 1)])
-        return np.asarray(values - level[self.orientation])
-
-
-@dataclass(frozen=True, eq=False)
 class _Side:
     """One sensor of a static log: the session in which it reads a bias, tests of it without and with the effects."""
 
@@ -116,16 +94,16 @@ class _Side:
 
 
 def _judged(
-    obs: Observations, pieces: StaticPieces, model: LinearModel, gravity_m_s2: float, sensor: int, alpha: float
+    obs: Observations, orientation: IntArray, model: LinearModel, gravity_m_s2: float, sensor: int, alpha: float
 ) -> _Side:
-    plain = _session(obs, pieces, model, gravity_m_s2, sensor)
+    plain = _session(obs, orientation, model, gravity_m_s2, sensor)
     kinds = [by_id()[f"{SENSORS[sensor].prefix}-{name}"] for name in ("thermal-bias", "bias-drift")]
     unit, drift = _unit(obs.recording, model, sensor), kinds[1]
     assert isinstance(drift, BiasDrift)
     # The size of a count is unknown: that with which the biases change as those of a usual part do.
     changes = plain.fitted.obs.pose_rate
     count = drift.typical / max(rms_of(changes), TINY) if unit == "counts" and changes is not None else 1.0
-    found = search(plain, alpha, [_aside(one, sensor, pieces, count) for one in kinds])
+    found = search(plain, alpha, [_aside(one, sensor, orientation, count) for one in kinds])
     known, terms = found.model, found.model.terms
     # What a curve of temperature or time leaves changes slowly too: no further cause is named for it.
     processes = [] if terms else bias_strengths(known, alpha)[0]
@@ -165,7 +143,7 @@ def _of_term(
         sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
         span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
         parameters, statement = effect.of_curve(term.variant, span, np.sqrt(2.0) * sigma, is_counts=is_counts)
-        series = _series(obs, along @ value, sigma, unit)
+        series = series_of(obs, along @ value, sigma, unit)
     said = parameters, statement, p_value, found.scores[k]
     return effect_record(effect, *said, held, rivals, curves, **series), p_value, parameters
 
@@ -177,17 +155,17 @@ def _of_walk(
     parameters, statement = drift.of_strength(one.size, one.std, is_counts=unit == "counts")
     said, held = (parameters, statement, one.p_value, one.score), held_out_records(one.without, known)
     curves = bias_curves(known.context, GYRO, path, one.std, [shown])
-    return effect_record(drift, *said, held, (), curves, **_series(known.obs, path, one.std, unit))
+    return effect_record(drift, *said, held, (), curves, **series_of(known.obs, path, one.std, unit))
 
 
-def _series(obs: Observations, path: FloatArray, sigma: FloatArray, unit: str) -> dict[str, Any]:
-    """The curve of a drifting bias, ``path`` (pieces, 3) with standard uncertainties (3,), as the result states it."""
-    times, errors = obs.pose_time_s.tolist(), [[float(s)] * len(path) for s in sigma]
-    return {"curve": {"time_s": times, "value": path.T.tolist(), "sigma": errors, "unit": unit}}
+def _centred(values: FloatArray, orientation: IntArray) -> FloatArray:
+    """Values (n, ...) minus their mean in every orientation (n,)."""
+    level = np.array([values[orientation == k].mean(axis=0) for k in range(orientation.max() + 1)])
+    return np.asarray(values - level[orientation])
 
 
 def _session(
-    obs: Observations, pieces: StaticPieces, model: LinearModel, gravity_m_s2: float, sensor: int
+    obs: Observations, orientation: IntArray, model: LinearModel, gravity_m_s2: float, sensor: int
 ) -> Hypothesis:
     """The session in whose place of the gyro a sensor reads its bias about the mean of every orientation; gravity is
     constant there, and S is known."""
@@ -196,15 +174,17 @@ def _session(
     density, sigma = ((obs.force_density, obs.pose_force_sigma), (obs.rate_density, obs.pose_rate_sigma))[sensor]
     assert means is not None
     aside = replace(
-        obs, raw_rate=raw, pose_rate=pieces.about_orientations(means), pose_rate_sigma=sigma, rate_density=density,
+        obs, raw_rate=raw, pose_rate=_centred(means, orientation), pose_rate_sigma=sigma, rate_density=density,
         pose_force=np.tile([0.0, 0.0, gravity_m_s2 / of_gravity[2, 2]], (obs.n_poses, 1)), force_up=None,
     )  # fmt: skip
     mean = np.concatenate([of_gravity[LOWER], np.zeros(3), of_sensor.ravel()])
-    prior = Prior(mean, np.diag((EXACT * np.repeat([of_gravity[0, 0], gravity_m_s2, of_sensor[0, 0]], (6, 3, 9))) ** 2))
+    prior = Prior(
+        mean, np.diag((PUBLISHED_DIGITS * np.repeat([of_gravity[0, 0], gravity_m_s2, of_sensor[0, 0]], (6, 3, 9))) ** 2)
+    )
     return hypothesis(aside, aside.at_means(gravity_m_s2, of_gravity, np.zeros(3), of_sensor), prior)
 
 
-def _aside(effect: Effect, sensor: int, pieces: StaticPieces, count: float) -> Effect:
+def _aside(effect: Effect, sensor: int, orientation: IntArray, count: float) -> Effect:
     """An effect whose columns, about their mean in every orientation, are those of the sensor in the gyro's place; a
     unit of its readings is ``count`` in SI."""
     kind: Any = type(effect)
@@ -214,7 +194,7 @@ def _aside(effect: Effect, sensor: int, pieces: StaticPieces, count: float) -> E
             return None
         columns = variant.distortion.rate if sensor == GYRO else variant.distortion.force
         assert columns is not None
-        return replace(variant, distortion=Distortion(None, pieces.about_orientations(columns)))
+        return replace(variant, distortion=Distortion(None, _centred(columns, orientation)))
 
     def is_plausible(self: Effect, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
         own = variant.distortion if sensor == GYRO else Distortion(variant.distortion.rate, None)
@@ -277,62 +257,3 @@ def _lines(plain: Hypothesis, obs: Observations, alpha: float) -> tuple[DomainTe
         return test, None
     record = effect_record(effect, found.parameters, found.statement, found.p_value, found.strength, found.held_out)
     return test, replace(record, share=found.share)
-
-
-def static_pieces(recording: Recording) -> StaticPieces | None:
-    """The static pieces of a log without rare orientations, whatever its segmentation makes of a bias that drifts;
-    ``None`` where too little of the log is static."""
-    assert recording.accelerometer is not None
-    n, t = recording.n_samples, recording.time_s
-    length = max(n // N_PIECES, FEWEST_SAMPLES)
-    spans = [(a, a + length) for a in range(0, n - length + 1, length)]
-    names = ("accelerometer",) if recording.gyroscope is None else ("accelerometer", "gyroscope")
-    variance, is_calm = {}, np.ones(len(spans), dtype=bool)
-    for name in names:
-        values, step = getattr(recording, name), recording.facts.of(name).step
-        own = np.array([np.nanvar(np.diff(values[a:b], axis=0), axis=0) / 2.0 for a, b in spans])
-        # A log that repeats one code is not free of noise: it has at least that of rounding.
-        rounding = step**2 / 12.0
-        is_quiet = (own <= LOUD * np.maximum(np.nanquantile(own, QUIET_QUANTILE, axis=0), rounding)).all(axis=1)
-        if not is_quiet.any():
-            return None
-        variance[name] = np.maximum(np.nanmedian(own[is_quiet], axis=0), rounding)
-        is_calm &= is_quiet
-    force = recording.accelerometer
-    early, late = (directions_of(np.array([np.nanmean(force[a + k : a + k + length // 2], axis=0) for a, _ in spans]))
-                   for k in (0, length // 2))  # fmt: skip
-    is_calm &= np.linalg.norm(late - early, axis=1) < TURNS_RAD
-    if is_calm.sum() < max(FEWEST_PIECES, MOSTLY_STILL * len(spans)):
-        return None
-    orientation = np.full(len(spans), -1)
-    orientation[is_calm] = _orientations(directions_of(early + late)[is_calm])
-    keep = np.flatnonzero(orientation >= 0)
-    if len(keep) < FEWEST_PIECES:
-        return None
-    used = [spans[k] for k in keep]
-    means = {name: np.array([np.nanmean(getattr(recording, name)[a:b], axis=0) for a, b in used]) for name in names}
-    of: dict[str, Any] = {f"gyroscope_{figure}": None for figure in ("mean", "sigma", "sigma_mean")}
-    for name in names:
-        sigma = np.sqrt(variance[name])
-        error = np.tile(sigma / np.sqrt(length), (len(used), 1))
-        of |= {f"{name}_mean": means[name], f"{name}_sigma": sigma, f"{name}_sigma_mean": error}
-    middle = np.array([0.5 * (t[a] + t[b - 1]) for a, b in used])
-    poses = tuple(Pose(k, a, b, a, b) for k, (a, b) in enumerate(used))
-    lasts = np.full(len(used), length / recording.rate_hz)
-    segments = Segments(poses=poses, moves=(), n_averaged=np.full(len(used), length), time_mid_s=middle,
-                        duration_s=lasts, **of)  # fmt: skip
-    return StaticPieces(segments, orientation[keep])
-
-
-def _orientations(up: FloatArray) -> IntArray:
-    """(n,) number of the orientation of every piece, the most frequent first; -1 for handling."""
-    out = np.full(len(up), -1, dtype=np.int64)
-    for number in range(len(up)):
-        free = np.flatnonzero(out < 0)
-        near = up[free] @ up[free].T > np.cos(SAME_POSE_RAD)
-        if not len(free) or near.sum(axis=1).max() < max(LEAST_SHARE * len(up), 2.0):
-            break
-        # A drifting bias widens an orientation: it is selected about the mean of the largest group.
-        centre = directions_of(up[free[near[near.sum(axis=1).argmax()]]].mean(axis=0)[None])[0]
-        out[free[up[free] @ centre > np.cos(SAME_POSE_RAD)]] = number
-    return out
