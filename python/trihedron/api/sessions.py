@@ -16,7 +16,7 @@ from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import amount_of, combine
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.sessions.changes import changes_among, of_another_unit
+from trihedron.estimate.sessions.changes import bias_drift, changes_among, of_another_unit
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.records import Finding, Frame, Recording, SensorCalibration, Severity
 from trihedron.records.progress import Progress
@@ -25,7 +25,6 @@ from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Change, Session
 from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
-from trihedron.session.noise import bias_drift
 
 BYS: tuple[By, ...] = get_args(By)
 LEFT_BY_S_AND_B = (

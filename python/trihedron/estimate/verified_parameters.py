@@ -7,13 +7,14 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, rms_of
+from trihedron.estimate.sessions.changes import bias_drift
 from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import RELATIVE
 from trihedron.records.sessions import PARAMETERS
 from trihedron.records.verification import JudgedParameter
 from trihedron.sensor_model import in_frame
-from trihedron.session.noise import DRIFT_DOF, NOISE_DOF, bias_drift
+from trihedron.session.noise import DRIFT_DOF, NOISE_DOF
 from trihedron.units import acceleration_to_si, rate_to_si
 
 TOO_VAGUE = 10.0

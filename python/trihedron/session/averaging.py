@@ -18,10 +18,6 @@ from trihedron.session.rounding import UNIFORM
 
 GAP = 1.5
 """A step longer than this many usual ones has lost samples, as in the session model (its ``gaps``)."""
-EITHER = 0.5
-"""Prior mean and standard deviation of ``a``: a sensor of either kind is one standard deviation off."""
-OF_FILTERS = 4.0
-"""The standard deviation where the noise shows a low-pass: corners at 0.2 of the rate or above are within two."""
 BLOCK = 1 << 16
 """Rows processed together, to bound the memory of intermediate arrays in a long log."""
 

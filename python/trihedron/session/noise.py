@@ -10,12 +10,10 @@ from trihedron.arrays import TINY, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.probability import CLEAR, MEDIAN_CHI2, ndtri
 from trihedron.quantiles import medians, quantiles
-from trihedron.records.calibration import Calibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.averaging import unresolved_variance
 from trihedron.session.rounding import rounding_of_moves
-from trihedron.transforms import directions_of
 
 LEAST_SHARE = 1e-9
 """Least error of a pose mean over the largest reading, for logs without scatter (a simulation without noise)."""
@@ -289,23 +287,3 @@ def between_sessions(away: FloatArray, noise: FloatArray, alike: FloatArray | fl
     shared = float((away[1:] * away[:-1] * weight).sum() / max((weight**2).sum(), TINY)) + float(np.mean(away**2)) / n
     shared = min(max(shared, 0.0), total)
     return 2.0 * shared + (total - shared) / n
-
-
-def bias_drift(calibration: Calibration, segments: Segments, n: int) -> FloatArray:
-    """Variance (n,) of the bias change between two sessions like the calibrated one (eq. 9.3), 0 for other parameters,
-    in the order of :data:`trihedron.records.sessions.PARAMETERS`."""
-    out = np.zeros(n)
-    accel, gyro = calibration.accelerometer, calibration.gyroscope
-    quality = accel.quality
-    if quality is not None and segments.accelerometer_mean is not None and len(quality.residual) > 3:
-        up = directions_of(segments.accelerometer_mean @ accel.S.T + accel.b)
-        if len(up) == len(quality.residual):
-            out[:3] = between_sessions(quality.residual, quality.sigma**2, np.einsum("ij,ij->i", up[1:], up[:-1]))
-    if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
-        biases = segments.gyroscope_mean @ gyro.S.T
-        noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T
-        is_seen = np.all(np.isfinite(biases) & np.isfinite(noise), axis=1)
-        if is_seen.sum() > 3:
-            biases, noise = biases[is_seen] - biases[is_seen].mean(axis=0), noise[is_seen]
-            out[9:12] = np.mean([between_sessions(biases[:, k], noise[:, k]) for k in range(3)])
-    return out

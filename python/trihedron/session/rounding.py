@@ -6,7 +6,6 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.quantiles import medians
 
 UNIFORM = 1.0 / 12.0
 """Variance of an error that is uniform over one step, in squares of the step."""
@@ -19,8 +18,6 @@ dither the ADC: the mean of rounded readings is wrong by up to half an LSB, howe
 CHATTER = 9
 """Length of the running median, in readings, that removes toggling between neighbouring codes."""
 STEADY = IN_STEP, CHATTER
-LEAST_WHITE = 1e-2
-"""Least white noise of an undithered axis, as a share of the rounding variance: its readings show none."""
 
 
 def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
@@ -50,37 +47,6 @@ def rounding_of_moves(
     nowhere = np.full(3, np.nan)
     found = [rounding_variance(readings[a:b], quantum, nowhere, axes) for a, b in ranges]
     return np.array([np.zeros(3) if of_move is None else of_move.sum(axis=0) for of_move in found]).reshape(-1, 3)
-
-
-def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> BoolArray:
-    """(n, 3) whether an axis of ``axes`` (3,) rests: it is in the LSB of its bias for longer than it takes to leave it,
-    while others rotate, or while the body stops inside a move."""
-    return _core.resting_axes(readings, (quantum, rest, axes), STEADY)
-
-
-def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> FloatArray:
-    """Errors (n, 3, k) of one standard deviation each that all moves share: the rotation of an axis inside the LSB of
-    its bias while another one leads."""
-    found = _core.shared_errors(readings, (quantum, rest, axes), STEADY)
-    out = np.zeros((*readings.shape, len(found)))
-    for k, (axis, error) in enumerate(found):
-        out[:, axis, k] = error
-    return out
-
-
-def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
-    """Rate noise (3,) [raw·√s], on undithered axes without the rounding that :func:`rounding_variance` adds."""
-    rounding = UNIFORM * quantum**2 * step_s
-    rest = np.maximum(density**2 - rounding, LEAST_WHITE * rounding)
-    return np.where(axes, np.sqrt(rest), density)
-
-
-def static_reading(means: FloatArray, quantum: FloatArray) -> FloatArray:
-    """(3,) mean of the means (n, 3) of the poses within an LSB of their median: a bias near the edge of a code has one
-    code in some poses, the next one in others."""
-    away = np.abs(means - medians(means))
-    is_near = away <= np.maximum(quantum, away.min(axis=0))
-    return np.asarray(np.mean(means, axis=0, where=is_near))
 
 
 @dataclass(frozen=True, eq=False)

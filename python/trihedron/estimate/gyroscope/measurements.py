@@ -10,20 +10,19 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases, shrink
-from trihedron.estimate.gyroscope.turn_rounding import resting_ends, unseen_rotation
+from trihedron.estimate.gyroscope.turn_rounding import (
+    density_without_rounding,
+    resting_axes,
+    resting_ends,
+    shared_errors,
+    static_reading,
+    unseen_rotation,
+)
 from trihedron.probability import chdtrc
 from trihedron.quantiles import MAD_TO_SIGMA, median
 from trihedron.ranges import rows_beside
 from trihedron.records import Move, Recording, Segments, SensorCalibration
-from trihedron.session.rounding import (
-    before_adc,
-    density_without_rounding,
-    resting_axes,
-    rounding_variance,
-    shared_errors,
-    static_reading,
-    undithered_axes,
-)
+from trihedron.session.rounding import before_adc, rounding_variance, undithered_axes
 
 GAP_STEPS = 5.0
 """A time step longer than this many usual ones is a gap, in which the rate is unknown."""

@@ -6,7 +6,8 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.session.rounding import CHATTER, IN_STEP, UNIFORM, undithered_axes
+from trihedron.quantiles import medians
+from trihedron.session.rounding import CHATTER, IN_STEP, STEADY, UNIFORM, undithered_axes
 
 HIDDEN = (0.465, 0.567, 0.689, 1.0), (1.156, 0.957, 0.782, 0.500)
 """Table for a rate that settles as exp(-t/τ), then for rates that start as t⁴, t² and t: ratio of the time for the
@@ -15,6 +16,39 @@ as a rate, in times of the first LSB. With rate r reached at t(r), codes give Σ
 (first order, mean of both directions): τ(2 ln 2 + γ + ln k), √k + ζ(½, ½)/2 of √k; before it the axis is static."""
 STEPS = IN_STEP, 1.0 + IN_STEP, 2.0 + IN_STEP
 """Limits, in LSB from the static reading, of the static code, of the next code and of the one after it."""
+LEAST_WHITE = 1e-2
+"""Least white noise of an undithered axis, as a share of the rounding variance: its readings show none."""
+
+
+def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> BoolArray:
+    """(n, 3) whether an axis of ``axes`` (3,) rests: it is in the LSB of its bias for longer than it takes to leave it,
+    while others rotate, or while the body stops inside a move."""
+    return _core.resting_axes(readings, (quantum, rest, axes), STEADY)
+
+
+def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> FloatArray:
+    """Errors (n, 3, k) of one standard deviation each that all moves share: the rotation of an axis inside the LSB of
+    its bias while another one leads."""
+    found = _core.shared_errors(readings, (quantum, rest, axes), STEADY)
+    out = np.zeros((*readings.shape, len(found)))
+    for k, (axis, error) in enumerate(found):
+        out[:, axis, k] = error
+    return out
+
+
+def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
+    """Rate noise (3,) [raw·√s], on undithered axes without the rounding that :func:`rounding_variance` adds."""
+    rounding = UNIFORM * quantum**2 * step_s
+    rest = np.maximum(density**2 - rounding, LEAST_WHITE * rounding)
+    return np.where(axes, np.sqrt(rest), density)
+
+
+def static_reading(means: FloatArray, quantum: FloatArray) -> FloatArray:
+    """(3,) mean of the means (n, 3) of the poses within an LSB of their median: a bias near the edge of a code has one
+    code in some poses, the next one in others."""
+    away = np.abs(means - medians(means))
+    is_near = away <= np.maximum(quantum, away.min(axis=0))
+    return np.asarray(np.mean(means, axis=0, where=is_near))
 
 
 def resting_ends(

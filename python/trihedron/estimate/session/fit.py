@@ -9,11 +9,11 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, rms_of, sigmas_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.likely import CAUSES, Likely, likely_shapes, with_columns
-from trihedron.estimate.session.observed import Observed
+from trihedron.estimate.session.observed import EITHER, Observed
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
 from trihedron.records.words import words
-from trihedron.session.averaging import EITHER, sharpened
+from trihedron.session.averaging import sharpened
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, SessionState, core_state, misfits, state_of
 from trihedron.session.noise import ANYTHING, NOISE_DOF, START_STRENGTHS, Bounds, Strengths
 

@@ -12,13 +12,17 @@ from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
-from trihedron.session.averaging import EITHER, OF_FILTERS, sharpened
+from trihedron.session.averaging import sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
 from trihedron.session.noise import measure_noise
 from trihedron.session.rounding import UNIFORM
 from trihedron.session.support import support_of
 from trihedron.transforms import directions_of
 
+EITHER = 0.5
+"""Prior mean and standard deviation of ``a``: a sensor of either kind is one standard deviation off."""
+OF_FILTERS = 4.0
+"""The standard deviation where the noise shows a low-pass: corners at 0.2 of the rate or above are within two."""
 DELAY_S = 0.005
 """Prior σ of the delay between the sensors, by filters or readout: data sheets differ by up to some ms."""
 Near = tuple[FloatArray, FloatArray, FloatArray]

@@ -15,7 +15,10 @@ import numpy as np
 from trihedron.arrays import TINY, FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.probability import fdtrc, ndtr
+from trihedron.records import Calibration, Segments
 from trihedron.records.sessions import GEOMETRY, ONE_UNIT, PARAMETERS, Change, ChangeKind, Session
+from trihedron.session.noise import between_sessions
+from trihedron.transforms import directions_of
 
 SPREAD_DOF, DRIFT_DOF = 25.0, 5.0
 """Degrees of freedom per session of its covariance and of its bias drift: some 25 poses, and half of that measured for
@@ -28,6 +31,26 @@ RIDGE = 1e-9
 
 Candidate = tuple[ChangeKind, int, FloatArray]
 """Kind of a change, the session at which it begins, and its course over the sessions (n,)."""
+
+
+def bias_drift(calibration: Calibration, segments: Segments, n: int) -> FloatArray:
+    """Variance (n,) of the bias change between two sessions like the calibrated one (eq. 9.3), 0 for other parameters,
+    in the order of :data:`trihedron.records.sessions.PARAMETERS`."""
+    out = np.zeros(n)
+    accel, gyro = calibration.accelerometer, calibration.gyroscope
+    quality = accel.quality
+    if quality is not None and segments.accelerometer_mean is not None and len(quality.residual) > 3:
+        up = directions_of(segments.accelerometer_mean @ accel.S.T + accel.b)
+        if len(up) == len(quality.residual):
+            out[:3] = between_sessions(quality.residual, quality.sigma**2, np.einsum("ij,ij->i", up[1:], up[:-1]))
+    if gyro is not None and segments.gyroscope_mean is not None and segments.gyroscope_sigma_mean is not None:
+        biases = segments.gyroscope_mean @ gyro.S.T
+        noise = (segments.gyroscope_sigma_mean**2) @ (gyro.S**2).T
+        is_seen = np.all(np.isfinite(biases) & np.isfinite(noise), axis=1)
+        if is_seen.sum() > 3:
+            biases, noise = biases[is_seen] - biases[is_seen].mean(axis=0), noise[is_seen]
+            out[9:12] = np.mean([between_sessions(biases[:, k], noise[:, k]) for k in range(3)])
+    return out
 
 
 def changes_among(units: Sequence[Sequence[Session]], *, alpha: float) -> tuple[Change, ...]:
