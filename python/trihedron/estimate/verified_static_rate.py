@@ -41,7 +41,7 @@ def expected_change(known: Calibration, recording: Recording, segments: Segments
     gyro = known.gyroscope
     if gyro is None or recording.gyroscope is None or not len(noise):
         return noise
-    spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64)
+    spans = segments.spans
     scale = float(np.cbrt(abs(np.linalg.det(gyro.S))))
     variance = noise**2 + (scale * expected_scatter(recording.gyroscope, spans)) ** 2
     if segments.gyroscope_sigma is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.checked import all_of, kind_of, numbers_of
 from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
@@ -155,6 +155,11 @@ class Segments(Presented):
     def n_poses(self) -> int:
         """Number of poses."""
         return len(self.poses)
+
+    @property
+    def spans(self) -> IntArray:
+        """(n_poses, 2) samples of every pose, half-open."""
+        return np.array([(pose.start, pose.stop) for pose in self.poses], dtype=np.int64).reshape(-1, 2)
 
     @property
     def norm_sigma(self) -> FloatArray | None:

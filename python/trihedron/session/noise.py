@@ -103,7 +103,7 @@ def measure_noise(
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), TINY)
     sigmas = [np.maximum(segments.accelerometer_sigma_mean, floor)]
     densities = [np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s)]
-    spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64).reshape(-1, 2)
+    spans = segments.spans
     of_rate = 0.0
     if recording.gyroscope is not None and segments.gyroscope_sigma is not None:
         sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), TINY))

@@ -4,17 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.arrays import AXES, TINY, FloatArray
+from trihedron import _core
+from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, acting_on
 from trihedron.diagnose.relations.dependence import Column, Dependence
+from trihedron.session.noise import half_changes
 
 HISTORY, NOT_TURNED = "last rotation", "before any rotation"
 """Family of the last rotation; poses without a known one (the first, or one after a gap) have their own column."""
 TIME_CONSTANTS_S = (1.0, 2.5, 6.0, 15.0)
 """Faster decays are over before a pose is static; slower ones retain the rotation for all of it."""
-LONGEST = 200.0
-"""Longest move in time constants that is integrated at once: the exponential of more would overflow."""
 
 
 class Decaying(Dependence):
@@ -35,9 +35,10 @@ class Decaying(Dependence):
 
     def _at(self, context: Context, tau_s: float) -> Variant:
         rate = context.axis_rate
-        values = forgotten(context, rate if len(self.names) > 1 else np.linalg.norm(rate, axis=1)[:, None], tau_s)
+        size = np.broadcast_to(np.linalg.norm(rate, axis=1)[:, None], rate.shape)
+        values = forgotten(context, rate if len(self.names) > 1 else size, tau_s)
         values[: context.n_points] -= values[: context.obs.n_poses].mean(axis=0)
-        columns = context.on_axes(self.sensor, np.broadcast_to(values, (len(values), 3)))
+        columns = context.on_axes(self.sensor, values)
         names = tuple(f"{axis}: {self.names[k % len(self.names)]}" for k, axis in enumerate(AXES))
         shape = {"time_constant": (tau_s, "s")}
         return Variant(acting_on(self.sensor, columns), names, ("rad",) * 3, shape, f"{tau_s:.3g} s")
@@ -50,41 +51,14 @@ def decaying(sensor: int) -> list[Dependence]:
 
 
 def forgotten(context: Context, rate: FloatArray, tau_s: float) -> FloatArray:
-    """(points + poses, k) ``y' = rate − y / τ``: means over the poses, samples of the moves, then the mean over the
-    second half of every pose less that over the first. Before the first pose, and after a gap, nothing is remembered.
-    """
-    obs, n = context.obs, context.n_points
-    out = np.zeros((n + obs.n_poses, rate.shape[1]))
-    begins = np.zeros((obs.n_poses, rate.shape[1]))
-    t, poses = obs.time_s, obs.segments.poses
-
-    def over(i: int) -> None:
-        """The pose ``i``, from what is remembered when it begins."""
-        lasts = max(float(t[poses[i].stop - 1] - t[poses[i].start]), TINY)
-        first, second = (-np.diff(np.exp(-np.array(part) * lasts / tau_s))[0] for part in ([0.0, 0.5], [0.5, 1.0]))
-        out[i] = begins[i] * (first + second) * tau_s / lasts
-        out[n + i] = begins[i] * (second - first) * 2.0 * tau_s / lasts
-
-    known = {
-        int(after): (where, int(before)) for where, (before, after) in zip(context.moves, obs.move_poses, strict=True)
-    }
-    for i in range(obs.n_poses):
-        if i in known:
-            where, before = known[i]
-            time, own = context.time_s[where], rate[where]
-            start = begins[before] * np.exp(-(time[0] - t[poses[before].start]) / tau_s)
-            out[where] = _within(time - time[0], own, start, tau_s)
-            begins[i] = out[where.stop - 1]
-        over(i)
-    return out
-
-
-def _within(time_s: FloatArray, rate: FloatArray, start: FloatArray, tau_s: float) -> FloatArray:
-    """(n, k) ``y`` at the samples of a move, from ``start`` (k,) at its first."""
-    grown = np.exp(np.minimum(time_s / tau_s, LONGEST))[:, None]
-    weighed = rate * grown
-    steps = 0.5 * np.diff(time_s)[:, None] * (weighed[1:] + weighed[:-1])
-    return np.asarray((start + np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(steps, axis=0)])) / grown)
+    """(points + poses, 3) ``y' = rate − y / τ`` of a rate (points, 3): means over the poses, samples of the moves, then
+    the mean over the second half of every pose less that over the first."""
+    obs = context.obs
+    whole = np.zeros((len(obs.time_s), 3))
+    whole[context.point_samples[obs.n_poses :]] = rate[obs.n_poses :]
+    # What is remembered of a rotation is a low-pass of its rate, times its time constant.
+    slow = tau_s * _core.simulate_first_order(whole, 1.0 / obs.recording.rate_hz, (tau_s,) * 3)
+    return np.concatenate([context.at_points(slow), half_changes(slow, obs.segments.spans)])
 
 
 def retained(context: Context) -> list[Column]:

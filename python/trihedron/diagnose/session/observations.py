@@ -223,7 +223,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         )
     for own, ends in zip(of_moves, poses, strict=True):
         own[2:] += swing[list(ends)].sum(axis=0)
-    spans = np.array([(pose.start, pose.stop) for pose in segments.poses], dtype=np.int64).reshape(-1, 2)
+    spans = segments.spans
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
