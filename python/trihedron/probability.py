@@ -66,6 +66,10 @@ def ndtri(below: float) -> float:
     return -_core.normal_upper(below)
 
 
+STRONG = 20.0
+"""Odds that are strong evidence (Kass, Raftery 1995), asked after everything that could be chosen was chosen."""
+STRONG_SCORE = 2.0 * math.log(STRONG)
+"""The same as a score, twice a log-likelihood."""
 CLEAR = 3.0
 """Standard errors from which a figure clearly differs: by chance once in 370."""
 SURE = ndtri(1.0 - 0.5 * RARE_ALARM)

@@ -11,7 +11,7 @@ from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.rows import SENSORS, difference
 from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration, model_of_diagnosis
 from trihedron.diagnose.against.mechanisms import FREE_CURVES, compare_effects, left_open_by
-from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor, compare_numbers
+from trihedron.diagnose.against.numbers import CommonFactor, compare_numbers
 from trihedron.probability import f_upper
 from trihedron.records import Calibration, Recording, Segments, Verification
 from trihedron.records.diagnosis import (
@@ -26,6 +26,7 @@ from trihedron.records.diagnosis import (
 from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.records.pose_noise import PoseNoise
 from trihedron.records.words import words
+from trihedron.session.noise import NOISE_DOF
 
 DECIBEL = 20.0 / math.log(10.0)
 FEWEST_POSES = 4
@@ -192,7 +193,7 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
     n = len(members)
     significant = [p for p in parameters if p.significant]
     channels = tuple(dict.fromkeys(f"{p.id} {p.name}" for p in significant))
-    chi2 = f_upper(n, SPREAD_DOF, max(worst.p_value, TINY))
+    chi2 = f_upper(n, NOISE_DOF, max(worst.p_value, TINY))
     return DomainTest("parameters", chi2, float(n), worst.p_value, bool(significant), Where(channels))
 
 

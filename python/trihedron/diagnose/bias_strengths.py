@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.candidates import NEAR, Tried, price_of_choice
+from trihedron.diagnose.candidates import Tried, price_of_choice
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.diagnose.session.observations import Observations
+from trihedron.probability import STRONG_SCORE
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, PART_NOISE, Bounds
@@ -73,7 +74,7 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
     for effect, without in zip(applying, bounded, strict=True):
         # Drift and scatter can absorb each other: one that is not needed may hide the size of the other.
         beside = (other for one, other in zip(applying, bounded, strict=True) if one.sensor == effect.sensor)
-        needless = [other for other in beside if other is not without and _gain(model, other) < NEAR]
+        needless = [other for other in beside if other is not without and _gain(model, other) < STRONG_SCORE]
         asked[effect.id] = _strength(model, effect, without, *needless)
     named = [one for one in asked.values() if one.score > limit and one.is_large]
     for sensor in range(2):
@@ -174,10 +175,10 @@ def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]
         return (columns.force, columns.rate)[one.effect.sensor] is not None and other.term.effect.id != one.effect.id
 
     # Bounds can only lower the evidence: only candidates that are near without them are evaluated.
-    near = [other for other in tried if acts(other) and other.score + one.price > -NEAR]
+    near = [other for other in tried if acts(other) and other.score + one.price > -STRONG_SCORE]
     asked = model.with_added([other.term for other in near], bounds_without(model, one.effect)) if near else []
     found = [
         replace(other, score=2.0 * (bounded.log_evidence - model.log_evidence) - other.term.cost, asked=bounded)
         for other, bounded in zip(near, asked, strict=True)
     ]
-    return sorted((other for other in found if other.score + one.price > -NEAR), key=lambda other: -other.score)
+    return sorted((other for other in found if other.score + one.price > -STRONG_SCORE), key=lambda other: -other.score)

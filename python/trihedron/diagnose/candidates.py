@@ -10,27 +10,24 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again, hypothesis
 from trihedron.diagnose.session.solve import Distortion
-from trihedron.probability import chdtrc
+from trihedron.probability import STRONG_SCORE, chdtrc
 from trihedron.threads import side_by_side
 
 WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
 """Rivals are fitted in full within this difference of scores, one linear step from the fit, or from this share of the
 best score on: one step predicts a large effect poorly."""
-N_RIVALS = 3
-"""Rivals fitted in full."""
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
 RESCALED = (10.0, 3.0, 0.3)
 """Factors on the prior width at which candidates are evaluated again."""
 N_LEADERS = 3
-"""Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted."""
+"""Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted, and rivals of
+those that are fitted in full."""
 AT_ONCE = 16
 """Effects whose columns are computed together."""
 SHAPES_KEPT = 2
 """Shapes kept per effect, counted separately for those with a plausible and those with an implausible size, and for
 those with a shape parameter and those without."""
-NEAR = 6.0
-"""Difference of scores below which two explanations are named together: odds of twenty to one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +60,7 @@ def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried
 
 
 def candidates_beside(
-    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str], least: float = -NEAR
+    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str], least: float = -STRONG_SCORE
 ) -> tuple[list[Tried], dict[str, str]]:
     """Candidates to add to a hypothesis, best first, that score more than ``least`` at some strengths; and the reasons
     why others do not apply."""
@@ -176,7 +173,7 @@ def worth_fitting(tried: Sequence[Tried]) -> list[Tried]:
 
 def with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
     """The hypothesis with the best of the candidates near the first, each fitted in full."""
-    near = worth_fitting(standing)[:N_RIVALS]
+    near = worth_fitting(standing)[:N_LEADERS]
     best: tuple[float, Hypothesis, Term] | None = None
     for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
         value, covariance = larger.value(len(larger.terms) - 1)

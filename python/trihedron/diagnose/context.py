@@ -18,8 +18,6 @@ VIBRATION_WINDOW_S = 0.25
 """Window of the parabola that follows the motion while vibration is measured in a move."""
 QUIET = 0.1
 """Quantile over the poses that is taken for the power of a pose without vibration."""
-LEAST_SWING_V = 1e-4
-"""A logged supply that changes by less is ignored: a tenth of a millivolt is far below any regulator's noise."""
 
 
 @dataclass(frozen=True, eq=False)

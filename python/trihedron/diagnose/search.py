@@ -13,8 +13,7 @@ import numpy as np
 
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
 from trihedron.diagnose.candidates import (
-    N_RIVALS,
-    NEAR,
+    N_LEADERS,
     WORTH_FITTING,
     Tried,
     all_beside,
@@ -29,6 +28,7 @@ from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import SENSORS, Effect
 from trihedron.diagnose.hypothesis import Hypothesis, again, without_each
 from trihedron.diagnose.relations.search import Related, related
+from trihedron.probability import STRONG_SCORE
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +143,8 @@ class _Search:
         model, without, beside = self._beside_relations(model, without)
         stated, missing = all_beside(model, self.effects)
         # Results with noise strengths refitted replace those at the strengths of the answer, of an effect the best.
-        # Rivals of a bias process, which pays the same price, are those down to ``NEAR`` below it.
-        least = -NEAR - price_of_choice(model, self.effects)
+        # Rivals of a bias process, which pays the same price, are those down to ``STRONG_SCORE`` below it.
+        least = -STRONG_SCORE - price_of_choice(model, self.effects)
         tried = [*reversed(stated), *reversed(candidates_beside(model, self.effects, (), least)[0])]
         held = {term.effect.id for term in model.terms}
         return Found(
@@ -179,13 +179,13 @@ class _Search:
             scored = [(2.0 * model.log_evidence - term.cost, model, term)]
             tried, _ = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms} - {term.effect.id})
             rivals_of_it = [one for one in worth_fitting(tried) if one.term.effect.id != term.effect.id]
-            for other in rivals_of_it[:N_RIVALS]:
+            for other in rivals_of_it[:N_LEADERS]:
                 fitted = as_fits_best(fewer, other)
                 changed = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
                 if fitted.effect.is_plausible(fitted.variant, *changed.value(k)):
                     scored.append((2.0 * changed.log_evidence - fitted.cost, changed, fitted))
             _, model, chosen = max(scored, key=lambda one: one[0])
-            least = model.log_evidence - 0.5 * NEAR
+            least = model.log_evidence - 0.5 * STRONG_SCORE
             beside = (t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect)
             rivals[chosen.effect.id] = tuple(dict.fromkeys(beside))
             against |= {one.term.effect.id: chosen.effect.id for one in tried if one.score > self.limit}

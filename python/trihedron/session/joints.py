@@ -6,10 +6,9 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.probability import STRONG
 from trihedron.session.averaging import GAP
 
-STRONG = 20.0
-"""Odds that are strong evidence (Kass, Raftery 1995), asked of a loss after its number and its joint were chosen."""
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
 

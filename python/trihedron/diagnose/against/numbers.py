@@ -15,14 +15,11 @@ from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector,
 from trihedron.probability import chdtri, fdtrc
 from trihedron.records.diagnosis import RELATIVE, ParameterDifference
 from trihedron.records.words import words
-from trihedron.session.noise import DRIFT_DOF
+from trihedron.session.noise import DRIFT_DOF, NOISE_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 Sensor = Literal["accelerometer", "gyroscope", "both"]
 
-SPREAD_DOF = 100.0
-"""Degrees of freedom of the covariances: those of a session of some tens of poses. F(3, 100) instead of χ² keeps the
-false-alarm rate of 72 simulated pairs; with 60 or 200 the 1 % point moves by 2 %."""
 RANGE_TOLERANCE = 0.05
 """A ratio of sensitivities within 5 % of a power of two on all axes is another range setting: parts do not vary by a
 factor of 1.9, and ranges are powers of two."""
@@ -60,7 +57,7 @@ class _Group:
     difference: FloatArray
     covariance: FloatArray
     unit: str
-    dof: float = SPREAD_DOF
+    dof: float = NOISE_DOF
     remark: str = ""
     is_relative: bool = False
 
@@ -263,7 +260,7 @@ def _as_gravity(scale: _Group, alpha: float) -> _Group:
     common = variance * float(ones @ weight @ scale.difference)
     rest = scale.difference - common
     unlike = float(rest @ weight @ rest) / 2.0
-    if fdtrc(2.0, SPREAD_DOF, unlike) < alpha:
+    if fdtrc(2.0, NOISE_DOF, unlike) < alpha:
         return scale
     return _Group(
         "gravity", "accelerometer", ("common scale",), np.ones(1), np.exp([common]), np.array([common]),

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 """Half-widths tried, a twentieth to half of g, then refined; above g the play never reverses in poses."""
@@ -43,13 +43,13 @@ def _coarse(context: Context) -> tuple[FloatArray, npt.NDArray[np.intp], int]:
 def _play(context: Context, width: float) -> Variant:
     coarse, index, _ = _coarse(context)
     # Hysteresis adds minus the lead of the force over its follower.
-    columns = on_axes(context, ACCELEROMETER, context.at_points(-_core.play(coarse, width)[index]))
+    lead = context.at_points(-_core.play(coarse, width)[index])
     shape = {"half_width": (width, "m/s^2")}
-    return Variant(columns, per_axis("offset"), ("m/s^2",) * 3, shape, "play")
+    return on_axes(context, ACCELEROMETER, ("offset", lead, "m/s^2"), label="play", shape=shape)
 
 
 def _creep(context: Context, tau: float) -> Variant:
     coarse, index, step = _coarse(context)
     slow = _core.simulate_first_order(coarse, step / context.obs.recording.rate_hz, (tau,) * 3)
-    columns = on_axes(context, ACCELEROMETER, context.at_points((slow - coarse)[index]))
-    return Variant(columns, per_axis("creep"), ("1",) * 3, {"time_constant": (tau, "s")}, "creep")
+    late = context.at_points((slow - coarse)[index])
+    return on_axes(context, ACCELEROMETER, ("creep", late, "1"), label="creep", shape={"time_constant": (tau, "s")})

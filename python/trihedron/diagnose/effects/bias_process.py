@@ -1,7 +1,7 @@
 """Bias that drifts in time, or differs from pose to pose, and that no logged channel explains."""
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -52,9 +52,7 @@ class BiasProcess(Effect):
         return SENSORS[self.sensor].unit
 
     def unavailable(self, context: Context) -> str | None:
-        if self.sensor == GYRO and context.obs.raw_rate is None:
-            return why_not("no-gyro")
-        return why_not("six-poses") if context.obs.n_poses < FEWEST_POSES else None
+        return super().unavailable(context) or (why_not("six-poses") if context.obs.n_poses < FEWEST_POSES else None)
 
     @abstractmethod
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
@@ -76,10 +74,10 @@ class BiasDrift(BiasProcess):
 
     def variants(self, context: Context) -> list[Variant]:
         """Line, warm-up exponentials, a slow curve of some cosines per axis, and steps (after a shock)."""
-        out = [self._along(context, lambda x: x[:, None], per_axis("drift"), "line")]
+        out = [self._along(context, lambda x: x[:, None], ("drift",), "line")]
         out += [self._warm_up(context, fraction * _duration_s(context)) for fraction in WARM_UP_FRACTIONS]
-        names = tuple(name for k in COSINES for name in per_axis(f"cosine{k}"))
-        out.append(self._along(context, lambda x: np.cos(np.pi * np.outer(x, COSINES)), names, "curve"))
+        symbols = [f"cosine{k}" for k in COSINES]
+        out.append(self._along(context, lambda x: np.cos(np.pi * np.outer(x, COSINES)), symbols, "curve"))
         return out + self._steps(context)
 
     def _warm_up(self, context: Context, tau_s: float) -> Variant:
@@ -88,9 +86,7 @@ class BiasDrift(BiasProcess):
         lasts_s = _duration_s(context)
         tau_s = max(tau_s, WARM_UP_FRACTIONS[0] * lasts_s)
         shape = {"time_constant": (tau_s, "s")}
-        return self._along(
-            context, lambda x: np.exp(-x[:, None] * lasts_s / tau_s), per_axis("warm_up"), "warm-up", shape
-        )
+        return self._along(context, lambda x: np.exp(-x[:, None] * lasts_s / tau_s), ("warm_up",), "warm-up", shape)
 
     def _steps(self, context: Context) -> list[Variant]:
         """Steps at the likeliest places between poses, chosen by the poses alone among all."""
@@ -99,13 +95,13 @@ class BiasDrift(BiasProcess):
         out = []
         for k in np.argsort(-gains)[:STEPS_KEPT]:
             at_s = float(0.5 * (times[k] + times[k + 1]))
-            made = self._along(context, _after(context, at_s), per_axis("step"), STEP, {STEP_TIME: (at_s, "s")})
+            made = self._along(context, _after(context, at_s), (STEP,), STEP, {STEP_TIME: (at_s, "s")})
             sigma = float(times[k + 1] - times[k]) * np.sqrt(UNIFORM)
             out.append(replace(made, shape_sigma=sigma, n_places=(h - 1) / STEPS_KEPT))
         return out
 
     def _along(
-        self, context: Context, curves: Callable[[FloatArray], FloatArray], names: tuple[str, ...], label: str,
+        self, context: Context, curves: Callable[[FloatArray], FloatArray], symbols: Sequence[str], label: str,
         shape: dict[str, tuple[float, str]] | None = None,
     ) -> Variant:  # fmt: skip
         """``curves`` (n, k) of the elapsed share of the session (n,), zero on average over the poses, as the session's
@@ -113,8 +109,8 @@ class BiasDrift(BiasProcess):
         poses = context.obs.segments
         x = (poses.time_mid_s - context.obs.time_s[0]) / _duration_s(context)
         centred = curves(context.elapsed) - np.average(curves(x), axis=0, weights=poses.duration_s)
-        columns = on_axes(context, self.sensor, *centred.T[:, :, None])
-        return Variant(columns, names, (self.unit,) * len(names), shape or {}, label)
+        parts = ((symbol, values[:, None], self.unit) for symbol, values in zip(symbols, centred.T, strict=True))
+        return on_axes(context, self.sensor, *parts, label=label, shape=shape)
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
         return np.full(variant.distortion.n_parameters, self.typical)
@@ -171,7 +167,7 @@ class AccelBiasDrift(BiasDrift):
 class GyroBiasDrift(BiasDrift):
     """Gyro bias drift: seen in the static rates from pose to pose."""
 
-    id, sensor = "gyro-bias-drift", GYRO
+    id, sensor, needs_gyro = "gyro-bias-drift", GYRO, True
     confounded_with = ("gyro-bias",)
     typical = TYPICAL[1]
 
@@ -208,6 +204,7 @@ class GyroBiasRepeatability(BiasProcess):
 
     is_spread = True
     id, sensor, walks = "gyro-bias-repeatability", GYRO, False
+    needs_gyro = True
 
     def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
         return per_axis_parameters("sigma", size, std, self.unit), self.reported("scatter", sigma=size)

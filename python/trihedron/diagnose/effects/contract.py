@@ -3,9 +3,8 @@
 To add one: write a file in this folder with a subclass of :class:`Effect` and nothing else (docs/adding-an-effect.md).
 """
 
-import itertools
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -14,7 +13,7 @@ import numpy as np
 from trihedron.arrays import AXES, TINY, FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Distortion, stacked
+from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain, HeldOut, Where
@@ -74,6 +73,7 @@ class Effect:
     """Whether the effect can be compensated in another recording of the same sensor, from logged signals alone."""
     needs_moves: ClassVar[bool] = False
     """Whether it shows only in moves between poses, which need a gyro."""
+    needs_gyro: ClassVar[bool] = False
     accounts_for: ClassVar[tuple[Domain, ...]] = ()
     """Domains of samples whose disagreement this effect explains."""
 
@@ -116,6 +116,8 @@ class Effect:
 
     def unavailable(self, context: Context) -> str | None:
         """Why this recording cannot show the effect, or ``None``."""
+        if self.needs_gyro and context.obs.raw_rate is None:
+            return why_not("no-gyro")
         return why_not("no-moves") if self.needs_moves and not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
@@ -219,15 +221,13 @@ def acting_on(sensor: int, columns: FloatArray) -> Distortion:
     return Distortion(None, columns) if sensor else Distortion(columns, None)
 
 
-def joined(variants: Sequence[Variant], label: str = "") -> Variant:
-    """Variants that act together, as one."""
-    names, units = (tuple(itertools.chain(*each)) for each in zip(*((v.names, v.units) for v in variants), strict=True))
-    return Variant(stacked([v.distortion for v in variants]), names, units, label=label)
-
-
-def on_axes(context: Context, sensor: int, *values: FloatArray) -> Distortion:
-    """Values (points, 3) along the axes of a sensor (0 accelerometer, 1 gyro), or (points, 1) alike on all of them, as
-    three parameters each."""
-    columns = [context.on_axes(sensor, np.broadcast_to(one, (len(one), 3))) for one in values]
+def on_axes(
+    context: Context, sensor: int, *parts: tuple[str, FloatArray, str],
+    label: str = "", shape: dict[str, tuple[float, str]] | None = None, scale: float = 1.0,
+) -> Variant:  # fmt: skip
+    """What a sensor (0 accelerometer, 1 gyro) reads more along its axes: three parameters for each part, of a symbol,
+    values (points, 3), or (points, 1) alike on all axes, and the parameters' unit."""
+    columns = [context.on_axes(sensor, np.broadcast_to(one, (len(one), 3))) for _, one, _ in parts]
     whole = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=2)
-    return acting_on(sensor, whole)
+    names, units = zip(*((f"{symbol}_{axis}", unit) for symbol, _, unit in parts for axis in AXES), strict=True)
+    return Variant(acting_on(sensor, whole), names, units, shape or {}, label, scale=scale)

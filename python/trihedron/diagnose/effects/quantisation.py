@@ -15,12 +15,8 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.rounding import TWO_CODES, UNIFORM, before_adc
 
-COARSE = 0.45
-"""Noise, in LSB, below which readings take two or three codes and their mean follows a staircase."""
 MOST_CODES = 0.2
 """Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
-FEWEST_CODES = 2
-"""Codes that show an LSB: static readings of a coarse ADC may take only two."""
 MOSTLY = 0.5
 """Share of the static readings on one code from which a dead zone around it is tested."""
 ZONE_STEPS, JUST_OUTSIDE = 3.5, 20
@@ -28,9 +24,6 @@ ZONE_STEPS, JUST_OUTSIDE = 3.5, 20
 its width: evenly spread readings would all lie there by chance once in 2²⁰."""
 FEWEST_READINGS = 4
 """Readings of a pose from which its codes determine a scatter."""
-NOISE_ENOUGH = 0.75
-"""Scatter, in LSB, at which averaging resolves the LSB: without the rounding variance of 1/12 it is a noise of 0.69,
-and the staircase of the mean is exp(-2π²·0.69²)/π = 3·10⁻⁵ LSB."""
 LEAST_SHARE = 0.1
 """Share of the codes from which missing ones are named: exports that rescale counts lack up to 9 %, 16-bit converters 3
 to 5 %, which changes no mean."""
@@ -79,7 +72,7 @@ def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> Missing
     """Codes skipped between visited ones (8.15a), or ``None`` where the poses show no LSB."""
     values = np.concatenate(poses)
     codes = np.unique(values)
-    if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
+    if step == 0.0 or len(codes) < 2 or len(codes) > MOST_CODES * len(values):
         return None
     # Neighbouring codes are expected of noise by which a third of the readings leave their code.
     if sigma**2 <= TWO_CODES * step**2:
@@ -148,7 +141,7 @@ class Quantisation(DirectEffect):
         worst = max(found, key=lambda one: one.step / one.sigma)
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_poses)
         names = tuple(CHANNELS[one.channel] for one in found)
-        if worst.missing and worst.sigma > NOISE_ENOUGH * worst.step:
+        if worst.missing:
             statement = self.reported(
                 "missing", channels=names, codes=[one.missing for one in found],
                 share=max(one.shifted for one in found),
@@ -190,11 +183,12 @@ class Quantisation(DirectEffect):
             sigma = float(np.sqrt(max(variance - UNIFORM * step**2, variance / 2.0)))
             error = np.full(len(poses), missing.error * step)
             return Lattice(c, step, sigma, sigma, np.zeros(len(poses)), error, missing.number, missing.share)
-        if scatter > NOISE_ENOUGH * step:
+        # The staircase of a mean is exp(-2π²σ²)/π LSB, for σ of half an LSB 2·10⁻³: averaging resolves the LSB.
+        if scatter**2 > (TWO_CODES + UNIFORM) * step**2:
             return None
         found = before_adc(poses, step)
         sigma, shift, spread = found.sigma, found.shift, np.hypot(found.own, found.common)
-        if sigma > COARSE:
+        if sigma**2 > TWO_CODES:
             return None
         return Lattice(c, step, sigma * step, scatter, shift * step, spread * step)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axes, per_axis
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axes
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import CLEAR
 from trihedron.records.diagnosis import EffectParameter
@@ -71,9 +71,9 @@ class SensorLag(_Late):
     def variants(self, context: Context) -> list[Variant]:
         out = []
         for sensor, side in enumerate(SENSORS):
-            columns = on_axes(context, sensor, -AXES_S * context.derivative(context.axis_motion(sensor)))
-            names = per_axis(f"{side.label}_lag")
-            out.append(Variant(columns, names, ("s",) * 3, label=f"{side.label}, {SEPARATE}", scale=AXES_S))
+            late = -AXES_S * context.derivative(context.axis_motion(sensor))
+            label = f"{side.label}, {SEPARATE}"
+            out.append(on_axes(context, sensor, (f"{side.label}_lag", late, "s"), label=label, scale=AXES_S))
         # A shorter time than the sampling resolves is that of a delay.
         least_s = LEAST_STEPS / context.obs.recording.rate_hz
         times = [t for t in TIMES_S if t >= least_s] or [TIMES_S[-1]]

@@ -70,7 +70,7 @@ class TableEffect(DirectEffect):
 LEAST_SINE = 0.3
 """Least sine of half the rotation: below 35° the vertical moves by less than 0.6 of the tilt."""
 ORDINARY_DEG = 0.05
-"""Feet, dust and hands tilt a case by a few hundredths of a degree on any table."""
+"""Feet, dust, hands and a stop tilt and turn a case by a few hundredths of a degree on any table."""
 
 
 def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
@@ -113,10 +113,6 @@ class TableTilt(TableEffect):
             p, chi2, (EffectParameter("tilt", tilt, max(error, 1e-4), "deg"),),
             self.reported("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
         )  # fmt: skip
-
-
-LEAST_RAD = 1e-3
-"""Error of an angle by the stop and the feet, a twentieth of a degree."""
 
 
 class TurnAngleError(TableEffect):
@@ -166,7 +162,7 @@ def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[Flo
     errors, angles = np.array([turn.error_rad for turn in turns]), np.array([turn.angle_rad for turn in turns])
     lasts_s = np.array([context.time_s[where.stop - 1] - context.time_s[where.start] for where in moves])
     # Inside one LSB that noise does not dither, the rate has one error throughout.
-    sigmas = np.sqrt(noise**2 * lasts_s + UNIFORM * (float(steps.max()) * lasts_s) ** 2 + LEAST_RAD**2)
+    sigmas = np.sqrt(noise**2 * lasts_s + UNIFORM * (float(steps.max()) * lasts_s) ** 2 + np.radians(ORDINARY_DEG) ** 2)
     for axis in range(3):
         rows = axes == axis
         if rows.sum() < 2:

@@ -1,17 +1,20 @@
-"""Bias or scale of either sensor that depends on a logged temperature."""
+"""Bias or scale of either sensor that depends on a logged temperature or supply voltage."""
 
 from typing import ClassVar
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant, on_axes, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant, on_axes
+from trihedron.diagnose.session.solve import stacked
 from trihedron.records.words import why_not
 from trihedron.session.drift import LEAST_SWING_K, PER_KELVIN
 
 LAGS_S = (5.0, 10.0, 20.0, 40.0)
 """Lags tried, s, of either sign, then refined: from a thermometer beside the die to one on the board."""
+LEAST_SWING_V = 1e-4
+"""A logged supply that changes by less is ignored: a tenth of a millivolt is far below any regulator's noise."""
 CURVES = ("linear", "quadratic", "cubic")
 LAG, RATE, HYSTERESIS = "lag", "rate", "hysteresis"
 BRANCH_K_S = 0.002
@@ -39,8 +42,8 @@ class ThermalScale(Thermal):
 
     def variants(self, context: Context) -> list[Variant]:
         assert context.temperature is not None
-        distortion = on_axes(context, self.sensor, context.temperature[:, None] * context.axis_motion(self.sensor))
-        return [Variant(distortion, per_axis("scale_per_kelvin"), ("1/K",) * 3)]
+        per_kelvin = context.temperature[:, None] * context.axis_motion(self.sensor)
+        return [on_axes(context, self.sensor, ("scale_per_kelvin", per_kelvin, "1/K"))]
 
 
 class AccelThermalScale(ThermalScale):
@@ -90,21 +93,17 @@ class ThermalBias(Thermal):
         """Temperature is relative to the mean of the logged one over the poses."""
         assert context.temperature_rate is not None
         curve, _, beside = label.partition(", ")
-        t, unit = context.die_temperature(lag_s), SENSORS[self.sensor].unit
+        t, rate = context.die_temperature(lag_s)[:, None], context.temperature_rate[:, None]
+        unit = SENSORS[self.sensor].unit
         powers = [("bias_per_kelvin", t, f"{unit}/K"), ("bias_per_kelvin2", t**2, f"{unit}/K^2"),
                   ("bias_per_kelvin3", t**3, f"{unit}/K^3")]  # fmt: skip
         parts = powers[: 1 + CURVES.index(curve)]
         if beside == RATE:
-            parts.append(("bias_per_kelvin_per_s", context.temperature_rate, f"{unit}/(K/s)"))
+            parts.append(("bias_per_kelvin_per_s", rate, f"{unit}/(K/s)"))
         elif beside == HYSTERESIS:
-            parts.append(("half_gap", np.tanh(context.temperature_rate / BRANCH_K_S), unit))
-        return Variant(
-            on_axes(context, self.sensor, *(values[:, None] for _, values, _ in parts)),
-            tuple(name for symbol, *_ in parts for name in per_axis(symbol)),
-            tuple(of for *_, of in parts for _ in AXES),
-            {"thermometer_lag": (lag_s, "s")} if beside == LAG else {},
-            label,
-        )
+            parts.append(("half_gap", np.tanh(rate / BRANCH_K_S), unit))
+        shape = {"thermometer_lag": (lag_s, "s")} if beside == LAG else {}
+        return on_axes(context, self.sensor, *parts, label=label, shape=shape)
 
 
 class AccelThermalBias(ThermalBias):
@@ -115,3 +114,31 @@ class AccelThermalBias(ThermalBias):
 class GyroThermalBias(ThermalBias):
     id, sensor = "gyro-thermal-bias", GYRO
     confounded_with = ("gyro-bias",)
+
+
+class SupplySensitivity(Effect):
+    """Ratiometric readout: scale and offset proportional to the logged supply voltage."""
+
+    id = "supply-sensitivity"
+    applies_elsewhere = True
+
+    def unavailable(self, context: Context) -> str | None:
+        if context.supply is None:
+            return why_not("no-supply")
+        return why_not("steady-supply") if np.ptp(context.supply) < LEAST_SWING_V else None
+
+    def variants(self, context: Context) -> list[Variant]:
+        assert context.supply is not None
+        v = context.supply[:, None]
+        out = [
+            on_axes(context, sensor, (f"{prefix}_scale", v * context.axis_motion(sensor), "1"),
+                    (f"{prefix}_offset", v, unit), label=label)
+            for sensor, (label, prefix, unit) in enumerate(SENSORS)
+            if sensor == ACCELEROMETER or context.obs.raw_rate is not None
+        ]  # fmt: skip
+        if len(out) == 1:
+            return out
+        # Both sensors of a chip have one supply.
+        accel, gyro = out
+        both = stacked([accel.distortion, gyro.distortion])
+        return [accel, gyro, Variant(both, accel.names + gyro.names, accel.units + gyro.units, label="both")]

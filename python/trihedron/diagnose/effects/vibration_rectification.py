@@ -4,7 +4,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, Effect, Variant, on_axes, per_axis
+from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, Effect, Variant, on_axes
 from trihedron.records.words import why_not
 
 ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
@@ -31,12 +31,11 @@ class VibrationRectification(Effect):
         excess = context.vibration_power
         # In moves vibration is hard to separate from quick motion: one variant with it, one without.
         still = np.where(np.arange(len(excess))[:, None] < context.obs.n_poses, excess, 0.0)
-        names, units = per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3
         out = [
-            Variant(on_axes(context, ACCELEROMETER, power), names, units, label=label)
+            on_axes(context, ACCELEROMETER, ("accel_bias_per_power", power, "1/(m/s^2)"), label=label)
             for power, label in ((excess, "accelerometer"), (still, "accelerometer-in-poses"))
         ]
         if context.obs.raw_rate is not None:
-            gyro, units = on_axes(context, GYRO, excess.sum(axis=1, keepdims=True)), ("(rad/s)/(m/s^2)^2",) * 3
-            out.append(Variant(gyro, per_axis("gyro_bias_per_power"), units, label="gyro"))
+            whole = excess.sum(axis=1, keepdims=True)
+            out.append(on_axes(context, GYRO, ("gyro_bias_per_power", whole, "(rad/s)/(m/s^2)^2"), label="gyro"))
         return out

@@ -14,6 +14,7 @@ from trihedron.diagnose.residuals.noise_level import noise_changes
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import LEAST_P, RARE_ALARM
 from trihedron.records.domains import DomainTest, Where
+from trihedron.session.noise import FEWEST_READINGS
 
 MIN_LINE_SHARE = 0.03
 """Share of the variance below which a line is ignored: long poses resolve lines far below the noise that change no
@@ -21,9 +22,6 @@ result."""
 LOUD = 3.0
 """Variance of a pose over that of the others from which it disagrees, and is named: real noise is not exactly Gaussian
 or white, and a pose on another support has 50 % more."""
-SHORTEST = 32
-"""Readings of a piece of a pose in which a line is sought."""
-
 N_TESTS = 3.0
 """Lines, noisy poses and changes of noise."""
 
@@ -70,7 +68,7 @@ def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
         # Contiguous parts: a line keeps its phase across each.
         for start, stop in obs.segments.poses[i].undisturbed():
             piece = x[start:stop]
-            if stop - start >= SHORTEST and np.isfinite(piece).all():
+            if stop - start >= FEWEST_READINGS and np.isfinite(piece).all():
                 out.append((start, piece - piece.mean(axis=0)))
     return out
 
