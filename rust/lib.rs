@@ -26,6 +26,7 @@ pub mod lines;
 pub mod mean_noise;
 pub mod move_moments;
 pub mod move_signals;
+pub mod noise_change;
 pub mod noise_floor;
 pub mod nonlinearity;
 pub mod norm_invariant;

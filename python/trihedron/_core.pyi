@@ -250,6 +250,13 @@ def column_means(
 def block_differences(
     readings: FloatArray, ranges: npt.NDArray[np.int64], owner: npt.NDArray[np.int64], length: int
 ) -> tuple[list[float], int]: ...
+def noise_change(
+    readings: FloatArray,
+    least: Sequence[float],
+    poses: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], int],
+    moves: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]],
+    fewest: int,
+) -> tuple[int, int, list[int], list[float], list[float], float, float] | None: ...
 
 # joints of a motion, and the law of its noise
 def motion_joints(

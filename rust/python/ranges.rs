@@ -5,12 +5,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat2, flat3, rows};
+use crate::noise_change as changes;
 use crate::ranges;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(means_by_owner, module)?)?;
     module.add_function(wrap_pyfunction!(column_means, module)?)?;
-    module.add_function(wrap_pyfunction!(block_differences, module)?)
+    module.add_function(wrap_pyfunction!(block_differences, module)?)?;
+    module.add_function(wrap_pyfunction!(noise_change, module)?)
 }
 
 /// Ranges `(k, 2)` of `n` rows.
@@ -125,4 +127,40 @@ fn block_differences(
         let rows = as_rows(&readings);
         Ok(ranges::block_differences(rows, &ranges, &owner, length))
     })
+}
+
+type Changed = (usize, usize, Vec<usize>, Vec<f64>, Vec<f64>, f64, f64);
+
+/// First and last pose, axes, ratios of noise with their errors, score and share of the change of noise in readings
+/// `(n, 3)` of which `least` is dithered; `poses`: ranges `(k, 2)`, the owner `(k,)` of each, and their number; `moves`:
+/// ranges `(m, 2)`, and the poses before and after `(m, 2)`.
+#[pyfunction]
+fn noise_change(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+    least: [f64; 3],
+    poses: (PyReadonlyArray2<'_, i64>, PyReadonlyArray1<'_, i64>, usize),
+    moves: (PyReadonlyArray2<'_, i64>, PyReadonlyArray2<'_, i64>),
+    fewest: usize,
+) -> PyResult<Option<Changed>> {
+    let readings = flat3("readings", &readings)?;
+    let ranges = ranges_within(&poses.0, readings.len() / 3)?;
+    let owner = owners(&poses.1, ranges.len(), poses.2)?;
+    let mut parts = vec![Vec::new(); poses.2];
+    for (range, own) in ranges.into_iter().zip(owner) {
+        parts[own].push(range);
+    }
+    let links = ranges_within(&moves.1, poses.2)?;
+    let moves = ranges_within(&moves.0, readings.len() / 3)?;
+    let moves: Vec<_> = moves.into_iter().zip(links).collect();
+    let found = super::run(py, || {
+        Ok(changes::noise_change(
+            as_rows(&readings),
+            least,
+            &parts,
+            &moves,
+            fewest,
+        ))
+    })?;
+    Ok(found.map(|c| (c.first, c.last, c.axes, c.ratio, c.sigma, c.score, c.share)))
 }
