@@ -14,7 +14,7 @@ from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
-from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, ROW_UNITS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS
 from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.observations import Observations
@@ -205,13 +205,7 @@ def held_out_stages(answer: Answer) -> tuple[Stage, ...]:
 
 
 def _stage(model: Hypothesis) -> tuple[StageDomain, ...]:
-    prediction = model.prediction
-    rms = physical_rms(model.fitted, prediction.innovation)
-    return tuple(
-        StageDomain(name, rms[d], float(prediction.chi2[d] / prediction.n_rows[d]), ROW_UNITS[d])
-        for d, name in ROW_DOMAINS.items()
-        if d in rms and prediction.n_rows[d] >= LEAST_DOF
-    )
+    return tuple(StageDomain(ROW_DOMAINS[d], *of, ROW_UNITS[d]) for d, of in sorted(model.held_out.items()))
 
 
 def candidates(answer: Answer) -> tuple[Candidate, ...]:

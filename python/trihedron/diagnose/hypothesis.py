@@ -124,6 +124,13 @@ class Hypothesis:
         """Blocks of poses and moves, each predicted from all others."""
         return predict_held_out(self.fitted)
 
+    @cached_property
+    def held_out(self) -> dict[int, tuple[float, float]]:
+        """Held-out rms [SI] and chi-square per row of every domain that has rows."""
+        prediction = self.prediction
+        rms = physical_rms(self.fitted, prediction.innovation)
+        return {d: (rms[d], float(prediction.per_row[d])) for d in rms if prediction.n_rows[d] >= LEAST_DOF}
+
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
         bounds = self.within if within is None else within
@@ -176,10 +183,9 @@ class Hypothesis:
         value, covariance = self.value(k)
         if not (np.abs(value) > sigmas_of(covariance)).any():
             return False
-        before = physical_rms(without.fitted, without.prediction.innovation)
-        after = physical_rms(self.fitted, self.prediction.innovation)
+        before, after = without.held_out, self.held_out
         changed = [own for side, own in OWN_DOMAINS.items() if getattr(self.terms[k].distortion, side) is not None]
-        return any(after[d] < before[d] for own in changed for d in own if d in after and d in before)
+        return any(after[d][0] < before[d][0] for own in changed for d in own if d in after and d in before)
 
 
 Column = tuple[FloatArray | None, FloatArray | None, list[float]]
@@ -224,15 +230,11 @@ def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
 
 def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
     """Held-out chi-square per row and rms [SI] of two hypotheses, per domain, the largest decrease of the rms first."""
-    was, now = before.prediction, after.prediction
-    rms_before, rms_after = physical_rms(before.fitted, was.innovation), physical_rms(after.fitted, now.innovation)
     out = []
-    for d, name in ROW_DOMAINS.items():
-        if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
-            continue
-        gain = float(np.log(max(rms_before[d], TINY) / max(rms_after[d], TINY)))
+    for d in before.held_out.keys() & after.held_out.keys():
+        (was, _), (now, left) = before.held_out[d], after.held_out[d]
+        fall = max(was, TINY) / max(now, TINY)
         # Both use the noise strengths of ``after``: those fitted without the effect absorb part of what it explains.
-        left = float(now.chi2[d] / now.n_rows[d])
-        before_over_it = left * (rms_before[d] / max(rms_after[d], TINY)) ** 2
-        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], ROW_UNITS[d])))
-    return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))
+        before_over_it = left * (was / max(now, TINY)) ** 2
+        out.append((-fall, d, HeldOut(ROW_DOMAINS[d], before_over_it, left, was, now, ROW_UNITS[d])))
+    return tuple(held for *_, held in sorted(out, key=lambda one: one[:2]))

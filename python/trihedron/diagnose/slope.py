@@ -8,10 +8,9 @@ from scipy.ndimage import gaussian_filter1d
 from trihedron.arrays import FloatArray, rms_of
 from trihedron.records import Recording
 
-TEMPERATURE_WINDOW_S = 10.0
-"""Smoothing of a logged temperature before its rate of change is taken: its resolution is about a tenth of a kelvin."""
-QUICK_WINDOW_S = 2.5
-"""The same for a fine thermometer, whose temperature may go up and down within a minute."""
+WINDOWS_S = (2.5, 10.0)
+"""Smoothing of a logged temperature before its rate of change is taken: of a fine thermometer, whose temperature may go
+up and down within a minute, and of one whose resolution is about a tenth of a kelvin."""
 SMALL_PART = 0.1
 """Error of the rate of temperature, in its rms, that takes one part in a hundred off an effect's size."""
 BLOCKS_OF_WIDTH = 10
@@ -21,7 +20,7 @@ samples to dozens of means."""
 
 def slope_of(values: FloatArray, recording: Recording) -> FloatArray:
     """(n,) rate of change, per second, of a channel (n,) of a recording."""
-    for window_s in (QUICK_WINDOW_S, TEMPERATURE_WINDOW_S):
+    for window_s in WINDOWS_S:
         width = window_s * recording.rate_hz
         slope = smoothed_slope(values, recording.time_s, width)
         if _error_of_mean(values, width) <= SMALL_PART * window_s * rms_of(slope):

@@ -6,11 +6,12 @@ import numpy as np
 from scipy.special import pdtrc
 
 from trihedron.arrays import FloatArray
+from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
-from trihedron.probability import FALSE_ALARM, RARE_ALARM
+from trihedron.probability import RARE_ALARM
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.rounding import TWO_CODES, UNIFORM, before_adc

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.session.observations import Observations
@@ -48,8 +49,11 @@ def with_inserted(obs: Observations, m: int, losses: dict[int, int]) -> Observat
     own = {k - a: n for k, n in losses.items()}
     time = with_time(obs.time_s[a:b], own, 1.0 / obs.recording.rate_hz)
     force, rate = (with_bridges(one[a:b], own) for one in (obs.raw_force, obs.raw_rate))
-    ranges, poses = ((0, len(time)),), obs.move_poses[m : m + 1]
-    return replace(obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=ranges, move_poses=poses)
+    poses, unresolved = obs.move_poses[m : m + 1], obs.unresolved[m : m + 1]
+    return replace(
+        obs, time_s=time, raw_force=force, raw_rate=rate, move_ranges=((0, len(time)),), move_poses=poses,
+        unresolved=unresolved,
+    )  # fmt: skip
 
 
 def moved(n: int, losses: dict[int, int]) -> IntArray:
@@ -84,13 +88,7 @@ def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
         return np.repeat(values[k : k + 1], n, axis=0)
     a, da = _edge(values[max(k - max(n // 2, 1), 0) : k + 1][::-1])
     b, db = _edge(values[k + 1 : k + 2 + max(n // 2, 1)])
-    da = -da
-    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
-    width = n + 1
-    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
-    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
-    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
-    return out
+    return np.asarray(CubicHermiteSpline([0, n + 1], [a, b], [-da, db])(np.arange(1, n + 1)))
 
 
 def _edge(values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,7 +39,7 @@ class Observations(SessionReadings):
     of the pose after, so that static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``jitter_s``
     is the scatter of sampling instants about their timestamps, once a diagnosis has found it; ``disturbed_s`` are
     disturbed intervals of poses, s.
-    ``unresolved`` maps a move's two poses to the variance of its integrals, (4, 3) in (raw unit · s)²: of force and
+    ``unresolved`` (m, 4, 3) is the variance of the moves' integrals, (raw unit · s)²: of force and
     rate by motion faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
     ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
     ``half_changes`` (poses, 3): raw mean over the second half of every pose less that over the first, of either sensor.
@@ -57,7 +57,7 @@ class Observations(SessionReadings):
     move_poses: npt.NDArray[np.intp]
     jitter_s: float = 0.0
     disturbed_s: tuple[tuple[float, float], ...] = ()
-    unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
+    unresolved: FloatArray
     support: tuple[Support, FloatArray] | None = None
     averaging: float = 0.0
 
@@ -76,7 +76,8 @@ class Observations(SessionReadings):
 
     def without_moves(self, bad: Collection[int]) -> Observations:
         keep = [m for m in range(self.n_moves) if m not in bad]
-        return replace(self, move_ranges=tuple(self.move_ranges[m] for m in keep), move_poses=self.move_poses[keep])
+        ranges, unresolved = tuple(self.move_ranges[m] for m in keep), self.unresolved[keep]
+        return replace(self, move_ranges=ranges, move_poses=self.move_poses[keep], unresolved=unresolved)
 
     def moves_from(self, poses: Collection[int]) -> list[int]:
         """The moves that begin at these poses. Where moves were left out before, their numbers are others."""
@@ -104,8 +105,8 @@ class Observations(SessionReadings):
         """The observations with poses that a yielding support rotates."""
         if self.pose_rate is None or self.pose_rate_sigma is None:
             return self
-        unresolved = {pair: own.copy() for pair, own in self.unresolved.items()}
-        for (before, _), own in unresolved.items():
+        unresolved = self.unresolved.copy()
+        for before, own in zip(self.move_poses[:, 0], unresolved, strict=True):
             own[3] += support.turns(before, gyro_S)
         pose_rate, sigma = support.static_rate(self.pose_rate, self.pose_rate_sigma, gyro_S)
         return replace(
@@ -151,8 +152,6 @@ class Observations(SessionReadings):
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
-        nothing = np.zeros((4, 3))
-        unresolved = [self.unresolved.get((int(a), int(b)), nothing) for a, b in self.move_poses]
         force, rate = (
             None if raw is None else np.ascontiguousarray(sharpened(raw, self.time_s, self.averaging))
             for raw in (self.raw_force, self.raw_rate)
@@ -165,7 +164,7 @@ class Observations(SessionReadings):
             rate=rate,
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
-            unresolved=np.array(unresolved).reshape(-1, 4, 3),
+            unresolved=np.ascontiguousarray(self.unresolved),
             leans=np.zeros((self.n_poses, 2, 3)) if self.support is None else self.support[0].leans,
         )
 
@@ -208,7 +207,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
     for move in segments.moves:
         start, stop = max(move.start - 1, 0), min(move.stop + 1, recording.n_samples)
         values = recording.accelerometer[start:stop]
-        finite = np.isfinite(values).all() and (raw_rate is None or np.isfinite(raw_rate[start:stop]).all())
+        finite = np.isfinite(values).all() and raw_rate is not None and np.isfinite(raw_rate[start:stop]).all()
         # Neither angle nor velocity can be integrated between poses hours apart, or across a gap: most of a move.
         lasts, steps = t[stop - 1] - t[start], np.diff(t[start:stop])
         is_known = lasts <= LONGEST_MOVE_S and steps.max(initial=0.0) < 0.5 * lasts
@@ -234,11 +233,9 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
         **vars(noise),
         pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),
-        move_ranges=tuple(ranges) if raw_rate is not None else (),
-        move_poses=np.array(poses if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
+        move_ranges=tuple(ranges), move_poses=np.array(poses, dtype=np.intp).reshape(-1, 2), unresolved=of_moves,
         disturbed_s=bumped,
-        unresolved=dict(zip(poses, of_moves, strict=True)), averaging=averaging,
-        earth_up_rad_s=earth_rate_up(recording.latitude_deg),
+        averaging=averaging, earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
 
 
