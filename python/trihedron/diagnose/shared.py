@@ -110,54 +110,40 @@ def shared_effects(
 
     ``models`` are the results of each recording alone; effects that may be the instrument's are tested anew.
     """
+    limit = threshold(alpha)
     bare = [again(m, [t for t in m.terms if not may_be_shared(t.effect)]) for m in models]
-    held, tried = _added(list(bare), threshold(alpha))
-    judged = [_judged(held, k, alpha) for k in range(held.n_added)]
-    while any(score <= threshold(alpha) for score, _ in judged):
-        held = held.without(int(np.argmin([score for score, _ in judged])))
-        judged = [_judged(held, k, alpha) for k in range(held.n_added)]
+    shared, tried = _added(bare, limit)
+    judged = [_judged(bare, shared, k, alpha) for k in range(len(shared))]
+    while any(score <= limit for score, _ in judged):
+        del shared[int(np.argmin([score for score, _ in judged]))]
+        judged = [_judged(bare, shared, k, alpha) for k in range(len(shared))]
     effects = sorted((one for _, one in judged), key=lambda one: -one.score)
     named = {one.id for one in effects}
     candidates = tuple(SharedCandidate(j.effect.id, j.score) for j in tried if j.effect.id not in named)
     return tuple(effects), candidates
 
 
-@dataclass(frozen=True, eq=False)
-class _Held:
+Shared = tuple[Term, ...]
+"""One effect in every recording."""
+
+
+def _beside(bare: Sequence[Hypothesis], shared: Sequence[Shared]) -> list[Hypothesis]:
     """Every recording with its own effects, followed by the shared ones."""
-
-    models: tuple[Hypothesis, ...]
-    n_added: int
-
-    def without(self, k: int) -> _Held:
-        fewer = tuple(again(m, [t for j, t in enumerate(m.terms) if j != self._at(m, k)]) for m in self.models)
-        return _Held(fewer, self.n_added - 1)
-
-    def _at(self, model: Hypothesis, k: int) -> int:
-        return len(model.terms) - self.n_added + k
-
-    def terms(self, k: int) -> tuple[Term, ...]:
-        """Shared effect ``k`` in every recording."""
-        return tuple(m.terms[self._at(m, k)] for m in self.models)
+    return [again(m, [*m.terms, *(terms[i] for terms in shared)]) for i, m in enumerate(bare)]
 
 
-def _added(models: list[Hypothesis], limit: float) -> tuple[_Held, list[_Joint]]:
-    held = _Held(tuple(models), 0)
-    names: set[str] = set()
+def _added(bare: Sequence[Hypothesis], limit: float) -> tuple[list[Shared], list[_Joint]]:
+    shared: list[Shared] = []
     while True:
-        tried = _tried(held.models, names)
+        tried = _tried(_beside(bare, shared), {terms[0].effect.id for terms in shared})
         if not tried or tried[0].score <= limit:
-            return held, tried
-        best = tried[0]
-        names.add(best.effect.id)
-        larger = tuple(again(m, [*m.terms, t.scaled(best.scale)]) for m, t in zip(held.models, best.terms, strict=True))
-        held = _Held(larger, held.n_added + 1)
+            return shared, tried
+        shared.append(tuple(term.scaled(tried[0].scale) for term in tried[0].terms))
 
 
-def _judged(held: _Held, k: int, alpha: float) -> tuple[float, SharedEffect]:
+def _judged(bare: Sequence[Hypothesis], shared: Sequence[Shared], k: int, alpha: float) -> tuple[float, SharedEffect]:
     """The score of a shared effect beside all others, and its record."""
-    fewer = held.without(k)
-    joint = _full(fewer.models, held.terms(k))
+    joint = _full(_beside(bare, [*shared[:k], *shared[k + 1 :]]), shared[k])
     term, unit = joint.terms[0], joint.terms[0].sizes
 
     def parameters(value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
@@ -185,21 +171,15 @@ def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Join
     terms = {key: tuple(one[key] for one in found) for key in common}
     looks = [m.at_its_strengths([terms[key][i] for key in common], (1.0,)) for i, m in enumerate(models)]
     plain = [m.log_evidence for m in models]
-    glanced = [_joint(terms[key], asked, plain) for key, *asked in zip(common, *looks, strict=True)]
-    first = _best_of_each(glanced)
+    glanced = (_joint(terms[key], asked, plain) for key, *asked in zip(common, *looks, strict=True))
+    best = {one.effect.id: one for one in sorted(glanced, key=lambda one: one.score)}
+    first = sorted(best.values(), key=lambda one: -one.score)
     full = [_full(models, one.terms) for one in first[:N_LEADERS]]
     return sorted([*full, *first[N_LEADERS:]], key=lambda one: -one.score)
 
 
 def _key(term: Term) -> tuple[object, ...]:
     return term.effect.id, term.variant.label, term.variant.names, tuple(sorted(term.variant.shape.items()))
-
-
-def _best_of_each(all_of: Sequence[_Joint]) -> list[_Joint]:
-    best: dict[str, _Joint] = {}
-    for one in sorted(all_of, key=lambda one: -one.score):
-        best.setdefault(one.effect.id, one)
-    return list(best.values())
 
 
 def _full(models: Sequence[Hypothesis], terms: tuple[Term, ...]) -> _Joint:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Pose
 from trihedron.session.noise import FEWEST_POSES, SessionNoise, quiet_errors
@@ -40,15 +40,16 @@ class Support:
         """Whether it is likelier than not that it does, and no bias that settles instead is certain."""
         return self.score > 0.0 and self.of_bias < CERTAIN
 
-    def turns(self, before: int, gyro_S: FloatArray) -> FloatArray:
-        """Variance (3,) of the integral of the rate over the move after a pose, (raw unit · s)², by its two ends."""
-        raw = (np.linalg.inv(gyro_S) ** 2).sum(axis=1)
-        return np.asarray(raw * (self.edge_variance[before, 1] + self.edge_variance[before + 1, 0]))
-
-    def static_rate(self, mean: FloatArray, sigma: FloatArray, gyro_S: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Raw mean rates (h, 3) of the poses without the motion, and their standard errors with its own."""
-        raw = np.linalg.inv(gyro_S)
-        return mean - self.rate[:, 0] @ raw.T, np.sqrt(sigma**2 + self.rate[:, 1] @ (raw**2).T)
+    def applied(
+        self, mean: FloatArray, sigma: FloatArray, unresolved: FloatArray, before: IntArray, gyro_S: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Raw mean rates (h, 3) of the poses without the motion, their standard errors with its own, and variances (m,
+        4, 3) of the integrals over the moves that begin in the poses ``before`` (m,), (raw unit · s)², with those of
+        their two ends."""
+        raw, ends = np.linalg.inv(gyro_S), self.edge_variance[before, 1] + self.edge_variance[before + 1, 0]
+        turned = unresolved.copy()
+        turned[:, 3] += ends[:, None] * (raw**2).sum(axis=1)
+        return mean - self.rate[:, 0] @ raw.T, np.sqrt(sigma**2 + self.rate[:, 1] @ (raw**2).T), turned
 
 
 def support_of(

@@ -105,10 +105,8 @@ class Observations(SessionReadings):
         """The observations with poses that a yielding support rotates."""
         if self.pose_rate is None or self.pose_rate_sigma is None:
             return self
-        unresolved = self.unresolved.copy()
-        for before, own in zip(self.move_poses[:, 0], unresolved, strict=True):
-            own[3] += support.turns(before, gyro_S)
-        pose_rate, sigma = support.static_rate(self.pose_rate, self.pose_rate_sigma, gyro_S)
+        seen = self.pose_rate, self.pose_rate_sigma, self.unresolved, self.move_poses[:, 0]
+        pose_rate, sigma, unresolved = support.applied(*seen, gyro_S)
         return replace(
             self, unresolved=unresolved, pose_rate=pose_rate, pose_rate_sigma=sigma, support=(support, gyro_S)
         )

@@ -122,10 +122,9 @@ def arranged(
     edges_of = [(pose, int(rows[a]), int(rows[b - 1]) + 1) for pose, (a, b) in zip(before, ranges, strict=True)]
     support = support_of(recording, segments.poses, edges_of, noise, (near[2], near[0], up), gravity_m_s2)
     if support is not None and support.yields:
-        pose_rate, own["pose_rate_sigma"] = support.static_rate(pose_rate, own["pose_rate_sigma"], near[2])
+        seen = pose_rate, own["pose_rate_sigma"], unresolved, moves_before
+        pose_rate, own["pose_rate_sigma"], unresolved = support.applied(*seen, near[2])
         leans = support.leans
-        for of_move, pose in zip(unresolved, before, strict=True):
-            of_move[3] += support.turns(pose, near[2])
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
         time_s=measured.time_s,
