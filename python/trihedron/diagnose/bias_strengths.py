@@ -21,9 +21,6 @@ from trihedron.records.words import Words
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, PART_NOISE, Bounds
 from trihedron.threads import side_by_side
 
-UNSEEN = 1.0
-"""Scatter from pose to pose, in standard errors of a pose mean, of 1/f noise below the white noise of the poses: none
-shows it."""
 DRIFT_CORNER_S = 2.0 * NOISE_CORNER_S
 """Corner time of a walk that twenty poses in some minutes do not show: half an error of a pose. A smooth drift of 12
 errors is likely as a walk with the corner time of the noisiest parts; that it exceeds 1/f noise its size shows:"""
@@ -136,7 +133,8 @@ def _strength(model: Hypothesis, effect: BiasProcess, without: Hypothesis, *need
 def _flicker(obs: Observations) -> FloatArray:
     """(2,) largest scatter from pose to pose that 1/f noise inside the poses explains, in units of ``scatter_unit``."""
     expected = np.array([obs.force_scatter, obs.rate_scatter])
-    return np.maximum(FLICKER_WITHIN * expected / obs.scatter_unit()[:, 0], UNSEEN)
+    # Scatter below the standard error of a pose mean shows in none.
+    return np.maximum(FLICKER_WITHIN * expected / obs.scatter_unit()[:, 0], 1.0)
 
 
 def _times_error(model: Hypothesis, sensor: int) -> float:

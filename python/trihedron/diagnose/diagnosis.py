@@ -17,11 +17,10 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Evidence
 from trihedron.diagnose.effects.timing_jitter import common_time_variance
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
-from trihedron.diagnose.relations.records import records
+from trihedron.diagnose.relations.records import noise_relations, records
 from trihedron.diagnose.relations.search import Related
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
-from trihedron.diagnose.residuals.noise_level import noise_relations
 from trihedron.diagnose.residuals.within_poses import judge_within_poses, within_limit
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import search, threshold

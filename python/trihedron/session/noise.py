@@ -213,8 +213,6 @@ PARTS = 8
 FEWEST_POSES = 6
 """Fewer poses do not separate two processes (drift, scatter, settling) on three axes."""
 FEWEST_READINGS = 4 * PARTS
-SEEN = 1.0
-"""Standard errors by which the mean square of halves must exceed white noise: low, as it only widens uncertainties."""
 
 
 def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray | None = None) -> float:
@@ -245,7 +243,8 @@ def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> Fl
     if not (white > 0.0).all():
         return np.zeros(k)  # readings are missing, or constant
     excess = float(np.mean(of_halves / white)) - 1.0
-    if not excess > SEEN * math.sqrt(2.0 / halves.size):
+    # One standard error: it only widens uncertainties.
+    if not excess > math.sqrt(2.0 / halves.size):
         return np.zeros(k)
     level = excess * white / (4.0 * math.log(2.0) * (1.0 - 2.0 / PARTS))
     octaves = float(np.ptp(spans)) / (2.0 * float(np.median(spans[:, 1] - spans[:, 0])))

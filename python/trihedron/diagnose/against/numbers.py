@@ -12,7 +12,7 @@ import numpy.typing as npt
 from trihedron.arrays import AXES, TINY, FloatArray, rms_of, sigmas_of
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
-from trihedron.probability import chdtri, fdtrc
+from trihedron.probability import STRONG, chdtri, fdtrc
 from trihedron.records.diagnosis import RELATIVE, ParameterDifference
 from trihedron.records.words import words
 from trihedron.session.noise import DRIFT_DOF, NOISE_DOF
@@ -35,8 +35,6 @@ MISTAKEN_UNITS: Mapping[str, tuple[tuple[float, str, str], ...]] = MappingProxyT
     }
 )
 """Reading over truth where a reading written in the first unit is read as the second."""
-NO_BIAS = 0.05
-"""p-value of three biases against 0 above which they count as zero: true zeros fail in one model of twenty."""
 WOULD_SHOW = 0.1
 """Uncertainty of a model's biases, relative to the rms of the recording's, below which missing biases are noticed."""
 ADRIFT = 1e-9
@@ -209,7 +207,7 @@ def _never_added(
 ) -> str:
     """Remark for a model whose biases are all zero within their uncertainty, where the recording's would be seen."""
     sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + drift, TINY))
-    is_none = float(np.sum((model / sigma) ** 2)) < chdtri(3.0, NO_BIAS)
+    is_none = float(np.sum((model / sigma) ** 2)) < chdtri(3.0, 1.0 / STRONG)
     would_show = bool(np.all(sigma < WOULD_SHOW * rms_of(recording)))
     name = "accelerometer" if prefix == "accel" else "gyro"
     return words("biases-never-added", sensor=name) if is_none and would_show else ""

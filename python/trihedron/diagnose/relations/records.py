@@ -10,6 +10,8 @@ from trihedron.diagnose.hypothesis import held_out_records
 from trihedron.diagnose.relations.rotations import NOT_TURNED
 from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import WORLD_VECTOR
+from trihedron.diagnose.residuals.noise_level import noise_changes
+from trihedron.diagnose.session.observations import Observations
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import CLEAR
 from trihedron.records.diagnosis import EffectParameter, Relation
@@ -32,6 +34,36 @@ def records(found: Related) -> tuple[Relation, ...]:
     return tuple(sorted(out, key=lambda relation: -relation.share))
 
 
+def noise_relations(obs: Observations, limit: float) -> tuple[Relation, ...]:
+    """The changes that score more than ``limit``, as empirical relations of the noise to time."""
+    poses, t = obs.segments.poses, obs.time_s
+    out = []
+    for one in (change for change in noise_changes(obs) if change.score > limit):
+        label, *_ = SENSORS[one.sensor]
+        begins_s, ends_s = float(t[poses[one.first].start]), float(t[poses[one.last].stop - 1])
+        each = zip(one.channels, one.changed, strict=True)
+        ratios = tuple(EffectParameter(name, one.ratio[k], one.sigma[k], "1") for name, k in each)
+        said = words(
+            "relation-follows-noise", sensor=label, ratios=[ratio.value for ratio in ratios],
+            axes=[name[1] for name in one.channels], begins_s=begins_s, ends_s=ends_s,
+        )  # fmt: skip
+        form = words("relation-form-noise")
+        out.append(_relation(one.sensor, ("time",), ratios, one.share, "noise", (form, said)))
+    return tuple(out)
+
+
+def _relation(
+    sensor: int, depends_on: tuple[str, ...], coefficients: tuple[EffectParameter, ...], share: float, family: str,
+    said: tuple[str, str],
+) -> Relation:  # fmt: skip
+    """A relation with what the catalogue says of its family; ``said`` are its form and its statement."""
+    form, statement = said
+    return Relation(
+        "gyroscope" if sensor else "accelerometer", depends_on, form, coefficients, share, None,
+        relation_resembles(family), relation_experiment(family), statement,
+    )  # fmt: skip
+
+
 def _of_variables(one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
     effect, variant, sigma = one.effect, one.term.variant, sigmas_of(covariance)
     out = SENSORS[effect.sensor].unit
@@ -50,20 +82,13 @@ def _of_variables(one: Follows, value: FloatArray, covariance: FloatArray, share
     names, axes = list(dict.fromkeys(names)), list(dict.fromkeys(axes))
     for shape, (size, unit) in variant.shape.items():
         coefficients.append(EffectParameter(shape, size, variant.shape_sigma, unit))
-    return Relation(
-        sensor="gyroscope" if effect.sensor else "accelerometer",
-        depends_on=tuple(names),
-        form=words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(names)]),
-        coefficients=tuple(coefficients),
-        share=share,
-        held_out=None,
-        resembles=relation_resembles(effect.family),
-        experiment=relation_experiment(effect.family),
-        statement=words(
-            "relation-follows", sensor=SENSORS[effect.sensor].label, is_static=not effect.is_motion, axes=axes,
-            depends=tuple(names), share=share,
-        ),
+    form = words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(names)])
+    statement = words(
+        "relation-follows", sensor=SENSORS[effect.sensor].label, is_static=not effect.is_motion, axes=axes,
+        depends=tuple(names), share=share,
     )  # fmt: skip
+    said = form, statement
+    return _relation(effect.sensor, tuple(names), tuple(coefficients), share, effect.family, said)
 
 
 def _of_world_vector(_one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
@@ -75,25 +100,14 @@ def _of_world_vector(_one: Follows, value: FloatArray, covariance: FloatArray, s
     spread = float(np.std([angle for _, angle in drawn]))
     away = min(float((np.abs(coupling - s * EARTH_RATE_RAD_S * np.eye(3)) / sigma).max()) for s in (1.0, -1.0))
     family = "earth" if away < CLEAR else "world"
-    return Relation(
-        sensor="gyroscope",
-        depends_on=(WORLD_VECTOR,),
-        form=words("relation-form-world"),
-        coefficients=(
-            *(
-                EffectParameter(f"{AXES[i]}: m_{AXES[j]}", float(coupling[i, j]), float(sigma[i, j]), "rad/s")
-                for i, j in np.ndindex(3, 3)
-            ),
-            EffectParameter(words("angle-to-vertical"), inclination, spread, "deg"),
-        ),
-        share=share,
-        held_out=None,
-        resembles=relation_resembles(family),
-        experiment=relation_experiment(family),
-        statement=words(
-            "relation-follows-world", inclination_deg=inclination, inclination_sigma_deg=spread, share=share
-        ),
-    )  # fmt: skip
+    coefficients = [
+        EffectParameter(f"{AXES[i]}: m_{AXES[j]}", float(coupling[i, j]), float(sigma[i, j]), "rad/s")
+        for i, j in np.ndindex(3, 3)
+    ]
+    coefficients.append(EffectParameter(words("angle-to-vertical"), inclination, spread, "deg"))
+    statement = words("relation-follows-world", inclination_deg=inclination, inclination_sigma_deg=spread, share=share)
+    said = words("relation-form-world"), statement
+    return _relation(1, (WORLD_VECTOR,), tuple(coefficients), share, family, said)
 
 
 def _coupling(parts: FloatArray, like: FloatArray | None = None) -> tuple[FloatArray, float]:

@@ -1,6 +1,7 @@
 """A scale that changes in the course of the session: a line, a step or a slow curve in time."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,9 +11,6 @@ from trihedron.diagnose.effects.bias_process import COSINES
 from trihedron.diagnose.effects.contract import Variant, acting_on
 from trihedron.diagnose.relations.dependence import Dependence
 
-KINDS = ((0, 1), (1, 2), (2, 3), (0, 3), (3, 4), (4, 7))
-"""Columns that compete: one axis, all axes, all alike, the triad turned (of a gyro: gravity does not show that of an
-accelerometer)."""
 MOST_STEPS = 8
 """Places of a step that are tried: one that is half a place away still has most of its evidence."""
 
@@ -35,15 +33,20 @@ class ScaleInTime(Dependence):
             kinds.append((turned, [f"{axis}: triad turned about {axis}" for axis in AXES]))
         base = np.concatenate([columns for columns, _ in kinds], axis=2)
         names = [name for _, of_kind in kinds for name in of_kind]
-        return [one for course in self.courses for one in self._along(base, names, course)]
+        # One axis, or all columns of a kind: all axes, all alike, the triad turned (gravity does not show that of an
+        # accelerometer).
+        edges = np.cumsum([0, *(len(of_kind) for _, of_kind in kinds)])
+        parts = [*((k, k + 1) for k in range(3)), *pairwise(edges.tolist())]
+        return [one for course in self.courses for one in self._along(base, names, course, parts)]
 
     def _along(
-        self, base: FloatArray, names: Sequence[str], course: tuple[Sequence[str], FloatArray]
-    ) -> Iterator[Variant]:
+        self, base: FloatArray, names: Sequence[str], course: tuple[Sequence[str], FloatArray],
+        parts: Sequence[tuple[int, int]],
+    ) -> Iterator[Variant]:  # fmt: skip
         said, curves = course
         centred, m = curves - curves.mean(axis=0), len(said)
         whole = acting_on(self.sensor, np.einsum("nip,nj->nipj", base, centred).reshape(len(base), 3, -1))
-        for first, last in KINDS[: 5 + self.sensor]:
+        for first, last in parts:
             part = tuple(range(first * m, last * m))
             own = tuple(f"{names[i // m]} {said[i % m]}" for i in part)
             yield Variant(whole.of(part), own, self.units * len(part), label=own[0], part_of=(whole, part))

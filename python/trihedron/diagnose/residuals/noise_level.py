@@ -6,12 +6,9 @@ from functools import lru_cache
 import numpy as np
 
 from trihedron import _core
-from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import CLEAR
-from trihedron.records.diagnosis import EffectParameter, Relation
-from trihedron.records.words import relation_experiment, relation_resembles, words
 from trihedron.session.noise import FEWEST_POSES
 from trihedron.session.rounding import TWO_CODES
 
@@ -49,26 +46,6 @@ def noise_changes(obs: Observations) -> tuple[NoiseChange, ...]:
     """The interval of poses of each sensor whose noise differs most clearly from that of all others, if one does."""
     found = (_change(obs, sensor) for sensor in range(obs.readings.shape[1] // 3))
     return tuple(one for one in found if one is not None and one.score > 0.0)
-
-
-def noise_relations(obs: Observations, limit: float) -> tuple[Relation, ...]:
-    """The changes that score more than ``limit``, as empirical relations of the noise to time."""
-    poses, t = obs.segments.poses, obs.time_s
-    out = []
-    for one in (change for change in noise_changes(obs) if change.score > limit):
-        label, *_ = SENSORS[one.sensor]
-        begins_s, ends_s = float(t[poses[one.first].start]), float(t[poses[one.last].stop - 1])
-        each = zip(one.channels, one.changed, strict=True)
-        ratios = tuple(EffectParameter(name, one.ratio[k], one.sigma[k], "1") for name, k in each)
-        said = words(
-            "relation-follows-noise", sensor=label, ratios=[ratio.value for ratio in ratios],
-            axes=[name[1] for name in one.channels], begins_s=begins_s, ends_s=ends_s,
-        )  # fmt: skip
-        out.append(Relation(
-            "gyroscope" if one.sensor else "accelerometer", ("time",), words("relation-form-noise"), ratios, one.share,
-            None, relation_resembles("noise"), relation_experiment("noise"), said,
-        ))  # fmt: skip
-    return tuple(out)
 
 
 def _change(obs: Observations, sensor: int) -> NoiseChange | None:
