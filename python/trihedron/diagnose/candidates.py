@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again, hypothesis
+from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import STRONG_SCORE, chdtrc
 from trihedron.threads import side_by_side
@@ -186,9 +186,8 @@ def with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Ter
 
 
 def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term, known = as_fits_best(model, tried), model.fitted
-    start = replace(known.state, effect=np.append(known.state.effect, np.zeros(term.distortion.n_parameters)))
-    return term, hypothesis(known.obs, start, known.prior, (*model.terms, term), model.within, tried.asked.strengths)
+    term = as_fits_best(model, tried)
+    return term, again(model, [*model.terms, term], strengths=tried.asked.strengths)
 
 
 # Shape parameters of an effect (a time constant, a delay): fitted, then carried as unknowns.

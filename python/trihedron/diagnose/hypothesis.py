@@ -210,17 +210,18 @@ def hypothesis(
     """The session fitted with some effects, alternating with its noise strengths of maximum evidence."""
     distortion = stacked([term.distortion for term in terms])
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
-    if len(start.effect) != len(sizes):
-        start = replace(start, effect=np.zeros(len(sizes)))
+    start = replace(start, effect=np.zeros(len(sizes)))
     fitted = solved(obs, start, prior, distortion, strengths, within, sizes, is_scatter_free=True)
     return Hypothesis(tuple(terms), fitted, within)
 
 
-def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None) -> Hypothesis:
-    """The same observations fitted with other effects or bounds, started from the known fit."""
-    state = replace(known.fitted.state, effect=np.zeros(0))
+def again(
+    known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None, strengths: Strengths | None = None
+) -> Hypothesis:
+    """The same observations fitted with other effects or bounds, started from the known fit, or from other
+    ``strengths``."""
     within = known.within if within is None else within
-    return hypothesis(known.obs, state, known.fitted.prior, terms, within, known.strengths)
+    return hypothesis(known.obs, known.fitted.state, known.fitted.prior, terms, within, strengths or known.strengths)
 
 
 def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:

@@ -7,10 +7,10 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
-from trihedron.diagnose.effects.contract import MIN_FALL, DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, predict_held_out, tune_noise
-from trihedron.probability import chdtri
+from trihedron.probability import LN_FAULT, chdtri
 from trihedron.records.diagnosis import Candidate
 from trihedron.session.model import DYNAMICS, MOVES, SessionState, misfits
 
@@ -124,7 +124,7 @@ def _mends(before: Fit, after: Fit, begins: frozenset[int] | None) -> bool:
     # The upper quartile: up to a quarter of the other moves may have lost samples too.
     usual = max(float(np.quantile(others, 0.75) / chdtri(1, 0.25)) if len(others) else 1.0, 1.0)
     fall = float(there.sum() - there_after.sum())
-    return fall > MIN_FALL * usual and float(there_after.mean()) < MUST_HALVE * float(there.mean())
+    return fall > 2.0 * LN_FAULT * usual and float(there_after.mean()) < MUST_HALVE * float(there.mean())
 
 
 def _of_moves(fitted: Fit, prediction: Prediction, begins: Collection[int]) -> tuple[np.ndarray, np.ndarray]:

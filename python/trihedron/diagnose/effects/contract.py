@@ -33,9 +33,6 @@ TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
 ACCELEROMETER, GYRO = 0, 1
 SENSORS = (Side("accelerometer", "accel", "m/s^2"), Side("gyro", "gyro", "rad/s"))
 NOWHERE = Where()
-MIN_FALL = 15.0
-"""Chi-square that a correction of the readings (samples inserted, poses cut) must gain: it allows for the search over
-place and size."""
 MOST_NAMED = 4
 """Places of one kind that a sentence names: more do not fit a line."""
 SHAPE_NAMES = ("time_constant", "half_width", "pose", "thermometer_lag", "step_time")

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import MIN_FALL, MOST_NAMED, DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import MOST_NAMED, DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.diagnose.session.inserted_samples import insert_samples, moved, with_inserted
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_residuals
-from trihedron.probability import CLEAR, chdtri
+from trihedron.probability import CLEAR, LN_FAULT, chdtri
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.joints import joints, most_lost
@@ -130,7 +130,7 @@ class _Move:
         own = self._refined(sorted(losses, key=lambda one: -one.gain))
         for one in sorted(losses, key=lambda one: one.gain):
             fewer = self._refined([other for other in own if other.sample != one.sample])
-            own = own if self._fall(own, fewer) >= MIN_FALL else fewer
+            own = own if self._fall(own, fewer) >= 2.0 * LN_FAULT else fewer
         # Gravity and velocity after the move are evidence as the joint of its two sides is.
         without = [[other for other in own if other is not one] for one in own]
         return [replace(one, gain=one.gain + self._fall(own, fewer)) for one, fewer in zip(own, without, strict=True)]

@@ -23,8 +23,6 @@ NEAR_ONE = (0.6, 1.6)
 """Range of a confirmed parameter: outside it another time of the grid fits better, or the mechanism does not."""
 LEAST_STEPS = 0.25
 """In sample intervals: a shorter time constant decays by e⁻⁴ within a sample, and its column is that of a delay."""
-AXES_S = 0.01
-"""s: unit of the columns of single axes; their parameters are lags in hundredths of a second."""
 SMOOTHING_SIGMA = (0.6, 1.0)
 """Prior σ of the variance of a filter's response over the square of its lag, which is between 0 and 1, and of one that
 both sensors have beyond that of the session."""
@@ -71,9 +69,9 @@ class SensorLag(_Late):
     def variants(self, context: Context) -> list[Variant]:
         out = []
         for sensor, side in enumerate(SENSORS):
-            late = -AXES_S * context.derivative(context.axis_motion(sensor))
+            late = -context.derivative(context.axis_motion(sensor))
             label = f"{side.label}, {SEPARATE}"
-            out.append(on_axes(context, sensor, (f"{side.label}_lag", late, "s"), label=label, scale=AXES_S))
+            out.append(on_axes(context, sensor, (f"{side.label}_lag", late, "s"), label=label))
         # A shorter time than the sampling resolves is that of a delay.
         least_s = LEAST_STEPS / context.obs.recording.rate_hz
         times = [t for t in TIMES_S if t >= least_s] or [TIMES_S[-1]]
