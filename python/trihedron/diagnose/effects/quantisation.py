@@ -56,28 +56,16 @@ class Lattice:
         return self.step**2 * (self.shifted if self.missing else UNIFORM)
 
 
-@dataclass(frozen=True, eq=False)
-class MissingCodes:
-    """Codes skipped between visited ones: their number, their share of the codes, and the standard error of a pose mean
-    by readings that come out one code higher or lower, in LSB."""
-
-    number: int
-    share: float
-    error: float
-
-
-NONE_MISSING = MissingCodes(0, 0.0, 0.0)
-
-
-def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> MissingCodes | None:
-    """Codes skipped between visited ones (8.15a), or ``None`` where the poses show no LSB."""
+def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> tuple[int, float, float] | None:
+    """Codes skipped between visited ones (8.15a), or ``None`` where the poses show no LSB: their number, their share of
+    the codes, and the standard error of a pose mean by readings that come out one code higher or lower, in LSB."""
     values = np.concatenate(poses)
     codes = np.unique(values)
     if step == 0.0 or len(codes) < 2 or len(codes) > MOST_CODES * len(values):
         return None
     # Neighbouring codes are expected of noise by which a third of the readings leave their code.
     if sigma**2 <= TWO_CODES * step**2:
-        return NONE_MISSING
+        return 0, 0.0, 0.0
     # Gap by gap: over hundreds of codes a relative error of 0.1 % of the step would add up to a whole code.
     place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(np.int64)
     expected, squares = np.zeros(place[-1] + 1), np.zeros(place[-1] + 1)
@@ -98,13 +86,13 @@ def missing_codes(poses: list[FloatArray], sigma: float, step: float) -> Missing
     is_tested = chance < FALSE_ALARM
     missing = is_tested & ~is_visited
     if not missing.any() or pdtrc(np.count_nonzero(missing) - 1.0, chance[is_tested].sum()) > RARE_ALARM:
-        return NONE_MISSING
+        return 0, 0.0, 0.0
     # Between all of them up and all down: uniform.
     error = float(np.sqrt(squares[missing].sum() / len(poses) / 3.0))
     # Beside a missing code none is tested.
     known = is_tested | np.convolve(missing, [True, False, True], "same").astype(bool)
     number = int(np.count_nonzero(missing))
-    return MissingCodes(number, number / int(np.count_nonzero(known)), error)
+    return number, number / int(np.count_nonzero(known)), error
 
 
 def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
@@ -177,13 +165,14 @@ class Quantisation(DirectEffect):
                 return None
             size = np.full(len(poses), dead / np.sqrt(3.0))  # anywhere inside the zone
             return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(poses)), size, dead=dead)
-        if missing.share > LEAST_SHARE:
+        number, share, error = missing
+        if share > LEAST_SHARE:
             density = obs.force_density if c < 3 else obs.rate_density
             assert density is not None
             variance = density[c % 3] ** 2 * obs.recording.rate_hz
             sigma = float(np.sqrt(max(variance - UNIFORM * step**2, variance / 2.0)))
-            error = np.full(len(poses), missing.error * step)
-            return Lattice(c, step, sigma, sigma, np.zeros(len(poses)), error, missing.number, missing.share)
+            errors = np.full(len(poses), error * step)
+            return Lattice(c, step, sigma, sigma, np.zeros(len(poses)), errors, number, share)
         # The staircase of a mean is exp(-2π²σ²)/π LSB, for σ of half an LSB 2·10⁻³: averaging resolves the LSB.
         if scatter**2 > (TWO_CODES + UNIFORM) * step**2:
             return None

@@ -183,17 +183,13 @@ def _driven(context: Context, known: Sequence[Driver], column: FloatArray, k: in
         return None
     direction = rows[0] * np.sign(rows[0][np.abs(rows[0]).argmax()])
     g = column @ direction
-    for driver in known:
-        if _is_determined(driver, g):
-            return _Column(k, g, direction, driver)
-    axis = int(np.abs(direction).argmax())
+    tried, axis = [(g, driver, False) for driver in known], int(np.abs(direction).argmax())
     for motion in (context.axis_force[:, axis], context.axis_rate[:, axis]):
         size = np.abs(motion)
         part = np.where(size > LEAST_PART * size.max(), g / np.where(motion == 0.0, 1.0, motion), np.nan)
-        for driver in known:
-            if driver.name not in ("force", "rate") and _is_determined(driver, part):
-                return _Column(k, part, direction, driver, is_relative=True)
-    return None
+        tried += [(part, driver, True) for driver in known if driver.name not in ("force", "rate")]
+    found = (_Column(k, part, direction, driver, own) for part, driver, own in tried if _is_determined(driver, part))
+    return next(found, None)
 
 
 def _is_determined(driver: Driver, g: FloatArray) -> bool:

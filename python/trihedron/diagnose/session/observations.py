@@ -213,14 +213,12 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
             ranges.append((start, stop))
             poses.append((move.pose_before, move.pose_after))
     noise, of_moves = measure_noise(recording, segments, ranges)
+    spans = segments.spans
     if noise.pose_rate_sigma is not None:
-        lasts = np.array([t[pose.stop - 1] - t[pose.start] for pose in segments.poses])
-        swing = swing + np.stack(
-            [np.zeros((segments.n_poses, 3)), _turned_at_ends(noise.pose_rate_sigma, lasts)], axis=1
-        )
+        lasts = t[spans[:, 1] - 1] - t[spans[:, 0]]
+        swing[:, 1] += _turned_at_ends(noise.pose_rate_sigma, lasts)
     for own, ends in zip(of_moves, poses, strict=True):
         own[2:] += swing[list(ends)].sum(axis=0)
-    spans = segments.spans
     return Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
@@ -230,7 +228,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         ),
         rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
         **vars(noise),
-        pose_time_s=np.array([0.5 * (t[pose.start] + t[pose.stop - 1]) for pose in segments.poses]),
+        pose_time_s=0.5 * (t[spans[:, 0]] + t[spans[:, 1] - 1]),
         move_ranges=tuple(ranges), move_poses=np.array(poses, dtype=np.intp).reshape(-1, 2), unresolved=of_moves,
         disturbed_s=bumped,
         averaging=averaging, earth_up_rad_s=earth_rate_up(recording.latitude_deg),

@@ -187,14 +187,9 @@ class Prediction:
     innovation: FloatArray
 
     @property
-    def chi2(self) -> FloatArray:
-        """(domains,) innovation chi-square."""
-        return np.asarray(self.fold_chi2.sum(axis=0))
-
-    @property
     def per_row(self) -> FloatArray:
         """(domains,) innovation chi-square per row."""
-        return self.chi2 / np.maximum(self.n_rows, TINY)
+        return np.asarray(self.fold_chi2.sum(axis=0) / np.maximum(self.n_rows, TINY))
 
 
 def _folds(fitted: Fit) -> npt.NDArray[np.bool_]:
