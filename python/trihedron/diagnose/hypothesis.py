@@ -133,8 +133,8 @@ class Hypothesis:
 
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
-        bounds = self.within if within is None else within
-        found = self.fitted.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], bounds)
+        bounds, asked = self.within if within is None else within, [_column(t.distortion, t.sizes) for t in terms]
+        found = self.fitted.core.evidence(asked, [self.strengths, *ELSEWHERE], bounds)
         return [AddedTerms(*one) for one in found]
 
     def gains(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AtStrengths]:
@@ -189,10 +189,6 @@ class Hypothesis:
 
 
 Column = tuple[FloatArray | None, FloatArray | None, list[float]]
-
-
-def _columns(terms: Sequence[Term]) -> list[Column]:
-    return [_column(t.distortion, t.sizes) for t in terms]
 
 
 def _column(distortion: Distortion, sizes: FloatArray) -> Column:

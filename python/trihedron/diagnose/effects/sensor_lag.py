@@ -29,12 +29,6 @@ both sensors have beyond that of the session."""
 SEPARATE, DELAYS, BOTH = "per axis", ", without smoothing", "smoothing_of_both"
 
 
-def is_near_one(value: FloatArray, covariance: FloatArray) -> bool:
-    """Whether a scaled parameter is near one, within three standard errors."""
-    sigma = CLEAR * float(np.sqrt(max(float(covariance[0, 0]), 0.0)))
-    return bool(NEAR_ONE[0] - sigma < value[0] < NEAR_ONE[1] + sigma)
-
-
 class _Late(Effect):
     """Readings of one sensor that trail the motion. One more parameter is no part of it: the smoothing of both sensors
     beyond that of the session (eq. 11.6d), which a calibration finds wrong where one is late."""
@@ -50,7 +44,8 @@ class _Late(Effect):
         return sizes
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        return is_near_one(value, covariance) and value[0] > 0.0
+        sigma = CLEAR * float(sigmas_of(covariance)[0])
+        return bool(max(NEAR_ONE[0] - sigma, 0.0) < value[0] < NEAR_ONE[1] + sigma)
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         lags = super().parameters(variant, value, covariance)

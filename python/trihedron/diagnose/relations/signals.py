@@ -47,7 +47,8 @@ class WorldVector(Dependence):
 def dependences(context: Context) -> list[Dependence]:
     """Every variable of this session, for both sensors, and vectors of three."""
     w, u = context.rate.T, context.force.T / context.fitted.state.gravity
-    products, history, warming = _products("u", u, "g^2"), retained(context), _warming(context)
+    products, history, speed = _products("u", u, "g^2"), retained(context), context.temperature_rate
+    warming: list[Column] = [] if speed is None else [("dT/dt", speed, "K/s")]
     rates: list[Column] = [(f"w_{AXES[a]}", w[a], "rad/s") for a in range(3)]
     out = [
         *scales_in_time(context, 0), *decaying(0), *_each(0, HISTORY, history),
@@ -71,11 +72,9 @@ def dependences(context: Context) -> list[Dependence]:
             *_each(1, "rate products", _products("w", w, "(rad/s)^2"), is_motion=True),
             *_each(1, "rate", size, is_motion=True), *_world_vector(context),
         ]  # fmt: skip
-    return [one for one in out if one.values.size == 0 or _varies(one.values)]
-
-
-def _varies(values: FloatArray) -> bool:
-    return bool(np.isfinite(values).all() and (np.ptp(values, axis=0) > 0.0).all())
+    # Those that vary, or compute their columns themselves.
+    return [one for one in out if not one.values.size
+            or (np.isfinite(one.values).all() and (np.ptp(one.values, axis=0) > 0.0).all())]  # fmt: skip
 
 
 def _each(sensor: int, family: str, columns: Sequence[Column], *, is_motion: bool = False) -> list[Dependence]:
@@ -92,11 +91,6 @@ def _products(symbol: str, values: FloatArray, unit: str) -> list[Column]:
     return [
         (f"{symbol}_{AXES[a]} {symbol}_{AXES[b]}", values[a] * values[b], unit) for a, b in combinations(range(3), 2)
     ]
-
-
-def _warming(context: Context) -> list[Column]:
-    speed = context.temperature_rate
-    return [] if speed is None else [("dT/dt", speed, "K/s")]
 
 
 def _world_vector(context: Context) -> list[Dependence]:
