@@ -124,9 +124,7 @@ class DisturbedPose(DirectEffect):
             held = (*held, predicted)
         if not disturbed and not restless:
             return None
-        t = obs.time_s
-        poses = obs.segments.poses
-        spans = tuple(disturbed) + tuple((float(t[poses[i].start]), float(t[poses[i].stop - 1])) for i in restless)
+        spans = (*disturbed, *obs.times(obs.segments.spans[restless]))
         # The session state already excludes the disturbance: rank it behind effects that improve the fit.
         strength = 10.0 * (len(disturbed) + len(restless))
         names = list(dict.fromkeys(obs.pose_names(restless)))

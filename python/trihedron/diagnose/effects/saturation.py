@@ -96,17 +96,15 @@ class _Saturation(DirectEffect):
         touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
         touched = self._near_limit(context, runs, touched, raw)
         begins = set(obs.move_poses[touched, 0].tolist())
-        t = obs.time_s
-        times = tuple((float(t[r.start]), float(t[r.stop - 1])) for r in runs[:8])
         channels = tuple(sorted({"ag"[self.sensor] + AXES[r.axis] for r in runs}))
         statement = self.reported(
             "plateaus", plateaus=len(runs), samples=_n_samples(runs), touched=len(touched), moves=obs.n_moves
         )
         # A part without a limit does not repeat one code at the end of its range.
-        p = LEAST_P if any(run.is_rail for run in runs) else max(min(float(np.exp(-gain)), 1.0), LEAST_P)
+        p = LEAST_P if any(run.is_rail for run in runs) else max(float(np.exp(-gain)), LEAST_P)
         return Evidence(
             p, -2.0 * np.log(p), self._limits(context, runs, sigma), statement, "moves" if is_gyro else "dynamics",
-            Where(channels, obs.move_names(touched[:8]), times),
+            Where(channels, obs.move_names(touched[:8]), obs.times((r.start, r.stop) for r in runs[:8])),
             reweigh=lambda old: old.without_moves(old.moves_from(begins)),
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had biased the scale factors
         )  # fmt: skip

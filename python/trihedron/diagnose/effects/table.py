@@ -129,19 +129,18 @@ class TurnAngleError(TableEffect):
         bad = np.flatnonzero(np.abs(z) > SURE)
         if len(bad) == 0:
             return None
-        names = context.obs.move_names([turns[k].move for k in bad])
+        obs, wrong = context.obs, [turns[k].move for k in bad]
+        names = obs.move_names(wrong)
         parameters = tuple(
             EffectParameter(f"error of {name}", float(np.degrees(errors[k])), float(np.degrees(sigmas[k])), "deg")
             for k, name in zip(bad, names, strict=True)
         )
-        t = context.obs.time_s
-        spans = tuple((float(t[a]), float(t[b - 1])) for a, b in (context.obs.move_ranges[turns[k].move] for k in bad))
         return Evidence(
             p, chi2, parameters,
             self.reported(
                 "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
             ),
-            "moves", Where(("gx", "gy", "gz"), names, spans),
+            "moves", Where(("gx", "gy", "gz"), names, obs.times(obs.move_ranges[m] for m in wrong)),
         )  # fmt: skip
 
 

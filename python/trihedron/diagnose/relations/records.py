@@ -36,11 +36,10 @@ def records(found: Related) -> tuple[Relation, ...]:
 
 def noise_relations(obs: Observations, limit: float) -> tuple[Relation, ...]:
     """The changes that score more than ``limit``, as empirical relations of the noise to time."""
-    poses, t = obs.segments.poses, obs.time_s
     out = []
     for one in (change for change in noise_changes(obs) if change.score > limit):
         label, *_ = SENSORS[one.sensor]
-        begins_s, ends_s = float(t[poses[one.first].start]), float(t[poses[one.last].stop - 1])
+        (begins_s, _), (_, ends_s) = obs.times(obs.segments.spans[[one.first, one.last]])
         each = zip(one.channels, one.changed, strict=True)
         ratios = tuple(EffectParameter(name, one.ratio[k], one.sigma[k], "1") for name, k in each)
         said = words(

@@ -93,13 +93,9 @@ def locate(fitted: Fit, label: int) -> Where:
     per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
     names = _CHANNELS[label]
     channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > CARRIES * per_channel.sum())
-    is_pose = label in (STATIC_ACCEL, STATIC_GYRO)
-    t = obs.time_s
-    spans = []
-    for s in heavy:
-        first, last = (obs.segments.poses[s].start, obs.segments.poses[s].stop) if is_pose else obs.move_ranges[s]
-        spans.append((float(t[first]), float(t[last - 1])))
-    return Where(channels, obs.pose_names(heavy) if is_pose else obs.move_names(heavy), tuple(spans))
+    if label in (STATIC_ACCEL, STATIC_GYRO):
+        return Where(channels, obs.pose_names(heavy), obs.times(obs.segments.spans[heavy]))
+    return Where(channels, obs.move_names(heavy), obs.times(obs.move_ranges[s] for s in heavy))
 
 
 def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> dict[int, float]:

@@ -149,11 +149,10 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
         clear = [one for one, p_change in changes.items() if p_change < alpha]
         changed = {pose for one in clear for pose in range(one.first, one.last + 1)}
         poses = sorted({*np.flatnonzero(loud.min(axis=1) < alpha).tolist()[:8], *changed})
-        t = obs.time_s
-        spans = tuple((float(t[obs.segments.poses[i].start]), float(t[obs.segments.poses[i].stop - 1])) for i in poses)
         strong = [line for line in lines if line.p_value < alpha]
+        frequencies = tuple(line.frequency_hz for line in strong)
         loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) < alpha)]
         changed_channels = [channel for one in clear for channel in one.channels]
         channels = tuple(dict.fromkeys([*(line.channel for line in strong), *loud_channels, *changed_channels]))
-        where = Where(channels, obs.pose_names(poses), spans, tuple(line.frequency_hz for line in strong))
+        where = Where(channels, obs.pose_names(poses), obs.times(obs.segments.spans[poses]), frequencies)
     return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")

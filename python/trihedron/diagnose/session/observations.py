@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -73,6 +73,10 @@ class Observations(SessionReadings):
     def move_names(self, which: Iterable[int]) -> tuple[str, ...]:
         """Moves by their numbers in the recording, from 1."""
         return tuple(self.whole.move_name(*self.move_ranges[m]) for m in which)
+
+    def times(self, ranges: Iterable[Sequence[int]]) -> tuple[tuple[float, float], ...]:
+        """First and last time [s] of half-open ranges of samples."""
+        return tuple((float(self.time_s[start]), float(self.time_s[stop - 1])) for start, stop in ranges)
 
     def without_moves(self, bad: Collection[int]) -> Observations:
         keep = [m for m in range(self.n_moves) if m not in bad]
