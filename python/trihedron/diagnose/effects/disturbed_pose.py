@@ -113,7 +113,8 @@ class DisturbedPose(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
-        seen = [(span, bump) for span in obs.disturbed_s if (bump := _bump(obs, span)) is not None]
+        found = obs.times((a, min(b + 1, len(obs.time_s))) for pose in obs.whole.poses for a, b in pose.disturbed)
+        seen = [(span, bump) for span in found if (bump := _bump(obs, span)) is not None]
         bumps = {span: bump for span, bump in seen if bump.chi2_per_dof_after < bump.chi2_per_dof_before}
         disturbed = list(bumps)
         held = (max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before),) if disturbed else ()

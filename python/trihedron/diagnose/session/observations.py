@@ -37,10 +37,9 @@ class Observations(SessionReadings):
     ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin``, the means over
     the poses. ``move_ranges`` are half-open sample ranges that include the last sample of the pose before and the first
     of the pose after, so that static samples bracket the whole motion; ``move_poses`` (m, 2) their poses. ``jitter_s``
-    is the scatter of sampling instants about their timestamps, once a diagnosis has found it; ``disturbed_s`` are
-    disturbed intervals of poses, s.
-    ``unresolved`` (m, 4, 3) is the variance of the moves' integrals, (raw unit · s)²: of force and
-    rate by motion faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
+    is the scatter of sampling instants about their timestamps, once a diagnosis has found it.
+    ``unresolved`` (m, 4, 3) is the variance of the moves' integrals, (raw unit · s)²: of force and rate by motion
+    faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
     ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
     ``half_changes`` (poses, 3): raw mean over the second half of every pose less that over the first, of either sensor.
     ``averaging`` is the smoothing of the samples by the sensors' filters (eq. 11.6d).
@@ -56,7 +55,6 @@ class Observations(SessionReadings):
     move_ranges: tuple[tuple[int, int], ...]
     move_poses: npt.NDArray[np.intp]
     jitter_s: float = 0.0
-    disturbed_s: tuple[tuple[float, float], ...] = ()
     unresolved: FloatArray
     support: tuple[Support, FloatArray] | None = None
     averaging: float = 0.0
@@ -197,7 +195,6 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         )
     t = recording.time_s
     whole = segments if segments.whole is None else segments.whole
-    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for pose in whole.poses for a, b in pose.disturbed)
     force_origin = segments.accelerometer_mean.mean(axis=0)
     rate_origin = np.zeros(3)
     raw_rate = pose_rate = None
@@ -234,7 +231,6 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         **vars(noise),
         pose_time_s=0.5 * (t[spans[:, 0]] + t[spans[:, 1] - 1]),
         move_ranges=tuple(ranges), move_poses=np.array(poses, dtype=np.intp).reshape(-1, 2), unresolved=of_moves,
-        disturbed_s=bumped,
         averaging=averaging, earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
 
