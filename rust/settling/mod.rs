@@ -104,14 +104,14 @@ pub fn settling(poses: &Poses<'_>, fewest: usize, certain: f64) -> Result<Option
         let size = SMALLEST * (LARGEST / SMALLEST).powf(share);
         if k == 0 { 0.0 } else { (unit * size).powi(2) }
     };
-    let sums = |tilts: f64| {
+    let sums = |moves: [f64; 2]| {
         SETTLES_S.map(|tau| {
             all.iter()
-                .map(|one| Sums::of(one, tau, tilts))
+                .map(|one| Sums::of(one, tau, moves))
                 .collect::<Vec<Sums>>()
         })
     };
-    let [of_support, of_bias] = [1.0, 0.0].map(sums);
+    let [of_support, of_bias, of_creep] = [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]].map(sums);
     // With the rate at the beginning of poses and its time constant.
     let likeliest = |tables: &[Vec<Sums>; SETTLES_S.len()], most: usize, settles: usize| {
         let tried: Vec<(usize, usize, usize)> = (0..SETTLES_S.len())
@@ -126,19 +126,22 @@ pub fn settling(poses: &Poses<'_>, fewest: usize, certain: f64) -> Result<Option
     };
     let any = likeliest(&of_support, N_SIZES, N_SIZES);
     let by_noise = likeliest(&of_support, BY_NOISE, N_SIZES);
-    // Biases scatter by what noise explains unless more is certain beside a support.
-    let (support, most) = if 2.0 * (any.0 - by_noise.0) > certain {
-        (any, N_SIZES)
-    } else {
-        (by_noise, BY_NOISE)
-    };
-    let without = likeliest(&of_support, most, 0).0;
     let bias = likeliest(&of_bias, N_SIZES, N_SIZES);
-    let score = |most: f64, other: f64| 2.0 * (most - other - (SETTLES_S.len() as f64).ln());
+    let scatter = likeliest(&of_support, N_SIZES, 0).0;
+    // An accelerometer that creeps turns its vertical alone.
+    let creep = likeliest(&of_creep, 0, N_SIZES).0 - likeliest(&of_creep, 0, 0).0;
+    let (apart, cost) = (scatter + creep, (SETTLES_S.len() as f64).ln());
+    // Biases scatter by what noise explains unless more, or such an accelerometer, is certain beside a support.
+    let (support, other) = if 2.0 * (any.0.max(apart) - by_noise.0) > certain {
+        (any, scatter.max(apart - cost))
+    } else {
+        (by_noise, likeliest(&of_support, BY_NOISE, 0).0)
+    };
+    let score = |most: f64, other: f64| 2.0 * (most - other - cost);
     let seen: Vec<Option<Seen>> = (0..n).map(|i| seen(poses, i)).collect();
     let of_bias: f64 = seen.iter().flatten().map(|one| one.of_bias).sum();
     Ok(Some(Settling {
-        score: score(support.0, without),
+        score: score(support.0, other),
         of_bias: score(bias.0, any.0).min(2.0 * of_bias),
         motion: motions(poses, seen, support.1, support.2),
     }))
@@ -209,8 +212,8 @@ fn contrasts(of: &[Vector3<f64>; N_BLOCKS]) -> [Vector3<f64>; N_BLOCKS - 1] {
 }
 
 impl Sums {
-    /// `tilts` 1 for a support, 0 for a bias.
-    fn of(one: &Parts, tau: f64, tilts: f64) -> Self {
+    /// Shares of the rate and of the tilt that `moves`: 1 and 1 of a support, 0 of a sensor that does not settle.
+    fn of(one: &Parts, tau: f64, moves: [f64; 2]) -> Self {
         let fades: [f64; N_BLOCKS] = std::array::from_fn(|block| {
             let begins = block as f64 * one.lasts;
             tau * ((-begins / tau).exp() - (-(begins + one.lasts) / tau).exp()) / one.lasts
@@ -222,10 +225,10 @@ impl Sums {
             square: 0.0,
         };
         for (rate, fade) in one.rates.iter().zip(fades) {
-            out.add(rate, &one.of_rate, [1.0, fade]);
+            out.add(rate, &one.of_rate, [1.0, moves[0] * fade]);
         }
         for (tilt, share) in one.tilts.iter().zip(tilted) {
-            out.add(tilt, &one.of_tilt, [0.0, tilts * share.x]);
+            out.add(tilt, &one.of_tilt, [0.0, moves[1] * share.x]);
         }
         out
     }

@@ -23,10 +23,10 @@ class Support:
     """Motion of the sensor with its support inside the poses.
 
     ``score``: twice the log-likelihood that it gains over biases that scatter, by noise unless more is certain beside
-    it, less the cost of the time constants tried; ``of_bias`` the same of a bias that settles, as far as gravity
-    prefers it. ``rate`` (h, 2, 3): mean rate of every pose by the motion and its variance, rad/s; ``leans`` (h, 2, 3):
-    change of the vertical from the mean over a pose to the end of the move before and to the beginning of the next;
-    ``edge_variance`` (h, 2) rad² of that rotation.
+    it, and over an accelerometer that creeps, less the cost of the time constants tried; ``of_bias`` the same of a bias
+    that settles, as far as gravity prefers it. ``rate`` (h, 2, 3): mean rate of every pose by the motion and its
+    variance, rad/s; ``leans`` (h, 2, 3): change of the vertical from the mean over a pose to the end of the move before
+    and to the beginning of the next; ``edge_variance`` (h, 2) rad² of that rotation.
     """
 
     score: float
