@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, rms_of
 from trihedron.diagnose.candidates import Tried, price_of_choice
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import STRONG_SCORE
+from trihedron.quantiles import medians
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, PART_NOISE, Bounds
@@ -138,8 +139,12 @@ def _flicker(obs: Observations) -> FloatArray:
 
 
 def _times_error(model: Hypothesis, sensor: int) -> float:
-    """Rms of the bias about its mean over the poses, in standard errors of a pose mean, largest axis."""
-    unit = model.obs.scatter_unit()[sensor] * model.context.si_per_raw(sensor)
+    """Rms of the bias about its mean over the poses, in standard errors of a pose mean by noise, largest axis."""
+    obs, unit = model.obs, model.obs.scatter_unit()[sensor]
+    if sensor and obs.segments.gyroscope_sigma_mean is not None:
+        # A support that yields widens the errors of poses, and no 1/f noise.
+        unit = rms_of(medians(obs.segments.gyroscope_sigma_mean))
+    unit = unit * model.context.si_per_raw(sensor)
     return float(np.max(model.fitted.bias(sensor).std(axis=0) / unit)) if model.obs.n_poses else 0.0
 
 
