@@ -173,7 +173,7 @@ class Hypothesis:
     def value(self, k: int) -> tuple[FloatArray, FloatArray]:
         """Parameters of term ``k`` and their covariance."""
         covariance, n = self.fitted.covariance(), self.fitted.distortion.n_parameters
-        first = sum(term.distortion.n_parameters for term in self.terms[:k])
+        first = n - sum(term.distortion.n_parameters for term in self.terms[k:])
         at = slice(first, first + self.terms[k].distortion.n_parameters)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
         return self.fitted.state.effect[at], own[at, at]
@@ -206,7 +206,6 @@ def hypothesis(
     """The session fitted with some effects, alternating with its noise strengths of maximum evidence."""
     distortion = stacked([term.distortion for term in terms])
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
-    start = replace(start, effect=np.zeros(len(sizes)))
     fitted = solved(obs, start, prior, distortion, strengths, within, sizes, is_scatter_free=True)
     return Hypothesis(tuple(terms), fitted, within)
 

@@ -217,6 +217,8 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     """Observations with one channel's pose means and noise as estimated from the codes."""
     is_accel = one.channel < 3
     k = one.channel % 3
+    if not is_accel and obs.undithered[k]:
+        return obs  # the session knows
     kind = "force" if is_accel else "rate"
     mean, sigma, density = (getattr(obs, n).copy() for n in (f"pose_{kind}", f"pose_{kind}_sigma", f"{kind}_density"))
     mean[:, k] += one.mean_shift

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray
+from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
 from trihedron.probability import CLEAR, MEDIAN_CHI2
@@ -18,6 +18,13 @@ from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import Change, Prior, SessionReadings, SessionState
 from trihedron.session.noise import along_gradient, half_changes, measure_noise
+from trihedron.session.rounding import (
+    UNIFORM,
+    biases_by_codes,
+    density_without_rounding,
+    rounding_in_moves,
+    undithered_axes,
+)
 from trihedron.session.support import Support, support_of
 
 UNSTEADY = 2.0
@@ -43,6 +50,9 @@ class Observations(SessionReadings):
     ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
     ``half_changes`` (poses, 3): raw mean over the second half of every pose less that over the first, of either sensor.
     ``averaging`` is the smoothing of the samples by the sensors' filters (eq. 11.6d).
+    ``undithered`` (3,) are gyro axes whose noise does not dither the LSB; ``rounding`` (n, 3, k) the derivatives of raw
+    rates in moves by k errors of rounding with prior σ ``rounding_sigma`` (k,): place of each of these axes' biases
+    inside the LSB, then errors that all moves share.
     """
 
     recording: Recording
@@ -58,6 +68,9 @@ class Observations(SessionReadings):
     unresolved: FloatArray
     support: tuple[Support, FloatArray] | None = None
     averaging: float = 0.0
+    undithered: BoolArray = field(default_factory=lambda: np.zeros(3, dtype=np.bool_))
+    rounding: FloatArray | None = None
+    rounding_sigma: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def n_moves(self) -> int:
@@ -130,6 +143,16 @@ class Observations(SessionReadings):
         """The Rust model; with ``is_scatter_free`` biases may differ from pose to pose."""
         timing_s = float(self.jitter_s), 1.0 / self.recording.rate_hz
         return self.core_model(gravity_m_s2, self.core_moves, timing_s, prior, is_scatter_free=is_scatter_free)
+
+    @cached_property
+    def rounding_at_points(self) -> FloatArray | None:
+        """(points, 3, k) ``rounding`` at the poses, then at the samples of the moves; ``None`` without any."""
+        if self.rounding is None:
+            return None
+        at_rest = np.zeros((self.n_poses, *self.rounding.shape[1:]))
+        places = np.eye(3)[:, self.undithered]
+        at_rest[:, :, : places.shape[1]] = places
+        return np.concatenate([at_rest, *(self.rounding[a:b] for a, b in self.move_ranges)])
 
     @cached_property
     def changes(self) -> tuple[Change | None, Change | None]:
@@ -220,7 +243,7 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         swing[:, 1] += _turned_at_ends(noise.pose_rate_sigma, lasts)
     for own, ends in zip(of_moves, poses, strict=True):
         own[2:] += swing[list(ends)].sum(axis=0)
-    return Observations(
+    obs = Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
         half_changes=(
@@ -232,6 +255,40 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
         pose_time_s=0.5 * (t[spans[:, 0]] + t[spans[:, 1] - 1]),
         move_ranges=tuple(ranges), move_poses=np.array(poses, dtype=np.intp).reshape(-1, 2), unresolved=of_moves,
         averaging=averaging, earth_up_rad_s=earth_rate_up(recording.latitude_deg),
+    )  # fmt: skip
+    return obs if obs.n_moves == 0 else _beside_rounding(obs)
+
+
+def _beside_rounding(obs: Observations) -> Observations:
+    """The observations with the places of the gyro's undithered biases inside the LSB as unknowns: their error is the
+    same in all poses and in readings of moves that rest there, and no number of poses averages it out."""
+    step, sigma = obs.recording.facts.of("gyroscope").step, obs.segments.gyroscope_sigma
+    assert obs.raw_rate is not None
+    assert obs.pose_rate is not None
+    assert obs.pose_rate_sigma is not None
+    assert obs.rate_density is not None
+    axes = np.zeros(3, dtype=np.bool_) if sigma is None else undithered_axes(step, sigma)
+    if not axes.any():
+        return obs
+    poses, interval_s = obs.segments.poses, 1.0 / obs.recording.rate_hz
+    edges = np.array(obs.move_ranges, dtype=np.int64)
+    variance, hidden, shared = rounding_in_moves(obs.raw_rate, step, obs.pose_rate, axes, edges)
+    by_codes, own = biases_by_codes(obs.pose_rate, [obs.raw_rate[pose.samples()] for pose in poses], step, axes)
+    lasts_s = interval_s * np.array([pose.stop - pose.start for pose in poses])[:, None]
+    white = density_without_rounding(obs.rate_density, step, interval_s, axes) / np.sqrt(lasts_s)
+    raw_rate, unresolved = obs.raw_rate.copy(), obs.unresolved.copy()
+    for k, ((a, b), pair) in enumerate(zip(obs.move_ranges, obs.move_poses, strict=True)):
+        # At rest inside a move an axis reads as in the poses around it.
+        before, after = (by_codes - obs.pose_rate)[pair]
+        raw_rate[a:b] += hidden[a:b] * np.linspace(before, after, b - a)
+        # Rounding to codes that are passed through is in the noise of samples.
+        beyond = variance[a:b].sum(axis=0) - (b - a) * UNIFORM * step**2
+        unresolved[k, 3] += np.maximum(beyond, 0.0) * interval_s**2
+    return replace(
+        obs, raw_rate=raw_rate, pose_rate=by_codes, unresolved=unresolved, undithered=axes,
+        pose_rate_sigma=np.where(axes, np.hypot(own, white), obs.pose_rate_sigma),
+        rounding=np.concatenate([hidden[:, :, None] * np.eye(3)[:, axes], shared], axis=2),
+        rounding_sigma=np.concatenate([step[axes] * np.sqrt(UNIFORM), np.ones(shared.shape[2])]),
     )  # fmt: skip
 
 

@@ -145,8 +145,14 @@ def solved(
 ) -> Fit:
     """Gauss-Newton on every row to convergence (eq. 11.9); noise strengths as given or likeliest ``within`` bounds.
 
-    ``sizes`` are the prior σ of the effects' parameters.
+    ``sizes`` are the prior σ of the effects' parameters. Errors of rounding are unknowns before these.
     """
+    if obs.rounding_at_points is not None:
+        columns = np.einsum("ij,pjk->pik", start.gyro_S, obs.rounding_at_points)
+        distortion = stacked([Distortion(None, columns), distortion])
+        sizes = obs.rounding_sigma if sizes is None else np.concatenate([obs.rounding_sigma, sizes])
+    if len(start.effect) != distortion.n_parameters:
+        start = replace(start, effect=np.zeros(distortion.n_parameters))
     core = obs.model(start.gravity, prior, is_scatter_free=is_scatter_free).fit(
         state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate), within=within, sizes=None if sizes is None else sizes.tolist(),

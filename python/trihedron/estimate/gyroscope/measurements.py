@@ -10,19 +10,11 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases, shrink
-from trihedron.estimate.gyroscope.turn_rounding import (
-    density_without_rounding,
-    resting_axes,
-    resting_ends,
-    shared_errors,
-    static_reading,
-    unseen_rotation,
-)
 from trihedron.probability import chdtrc
 from trihedron.quantiles import MAD_TO_SIGMA, median
 from trihedron.ranges import rows_beside
 from trihedron.records import Move, Recording, Segments, SensorCalibration
-from trihedron.session.rounding import before_adc, rounding_variance, undithered_axes
+from trihedron.session.rounding import biases_by_codes, density_without_rounding, rounding_in_moves, undithered_axes
 
 GAP_STEPS = 5.0
 """A time step longer than this many usual ones is a gap, in which the rate is unknown."""
@@ -148,12 +140,15 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     scatter = np.full(3, np.inf) if segments.gyroscope_sigma is None else segments.gyroscope_sigma
     undithered = undithered_axes(quantum, scatter)
     rate, of_bridge, is_clipped = bridge_clipping(recording, rows)
-    of_rounding, hidden, shared = _rounded(gyroscope, quantum, gyroscope_mean, undithered, (in_log, rows))
+    rounding = rounding_in_moves(gyroscope, quantum, gyroscope_mean, undithered, in_log)
+    of_rounding, hidden, shared = (each[rows] for each in rounding)
     time_s = recording.time_s[rows]
     bias_read, var_bias_read = bias, var_bias
     bias, var_bias = shrink(bias, var_bias, pool_biases(bias, var_bias)[0])
     if np.any(undithered):
-        of_codes, own = _by_codes(bias_read, segments, gyroscope, quantum, undithered)
+        of_codes, own = biases_by_codes(
+            bias_read, [gyroscope[pose.samples()] for pose in segments.poses], quantum, undithered
+        )
         bias, var_bias = np.where(undithered, of_codes, bias), np.where(undithered, own**2, var_bias)
         # At rest inside a move an axis reads as in the poses around it.
         for (first, last), pair in zip(edges, (of_codes - bias_read)[links], strict=True):
@@ -189,24 +184,6 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
     )
 
 
-def _rounded(
-    readings: FloatArray, quantum: FloatArray, means: FloatArray, axes: BoolArray, where: tuple[IntArray, IntArray]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rounding of undithered ``axes`` (3,) in moves, ``where`` (their edges in the log, rows (k,) of the log): variance
-    (k, 3), 1 where a reading is in the LSB of its bias (k, 3), shared errors (k, 3, j).
-
-    ``means`` (n, 3) are those of the poses.
-    """
-    in_log, rows = where
-    coarse = readings, quantum, static_reading(means, quantum), axes
-    variance = rounding_variance(*coarse)
-    if variance is None:
-        return np.zeros((len(rows), 3)), np.zeros((len(rows), 3)), np.zeros((len(rows), 3, 0))
-    is_static = resting_ends(*coarse, in_log) | resting_axes(*coarse)
-    variance = np.maximum(variance, unseen_rotation(is_static, quantum, in_log))
-    return variance[rows], is_static[rows].astype(np.float64), shared_errors(*coarse)[rows]
-
-
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
     moves = [move for move in segments.moves if move.stop - move.start >= 2]
     if not moves:
@@ -216,20 +193,6 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
     if moves[-1].stop > recording.n_samples or segments.poses[-1].stop > recording.n_samples:
         raise InputError("the segments reach beyond the recording: they belong to another log")
     return moves
-
-
-def _by_codes(
-    read: FloatArray, segments: Segments, gyroscope: FloatArray, quantum: FloatArray, undithered: BoolArray
-) -> tuple[FloatArray, FloatArray]:
-    """Biases (n, 3) of the poses on undithered axes, as their codes show them to change about the mean of what was
-    ``read``, with standard errors (n, 3). The place of all inside the LSB is left to the moves."""
-    out, own = read.copy(), np.zeros(read.shape)
-    for axis in np.flatnonzero(undithered).tolist():
-        readings = [gyroscope[pose.samples(), axis] for pose in segments.poses]
-        found = before_adc([one[np.isfinite(one)] for one in readings], float(quantum[axis]))
-        out[:, axis] += quantum[axis] * (found.shift - found.shift.mean())
-        own[:, axis] = quantum[axis] * found.own
-    return out, own
 
 
 def _steps_of(recording: Recording) -> tuple[float, float]:
