@@ -263,23 +263,21 @@ def _beside_rounding(obs: Observations) -> Observations:
     """The observations with the places of the gyro's undithered biases inside the LSB as unknowns: their error is the
     same in all poses and in readings of moves that rest there, and no number of poses averages it out."""
     step, sigma = obs.recording.facts.of("gyroscope").step, obs.segments.gyroscope_sigma
-    assert obs.raw_rate is not None
-    assert obs.pose_rate is not None
-    assert obs.pose_rate_sigma is not None
-    assert obs.rate_density is not None
+    if obs.raw_rate is None or obs.pose_rate is None or obs.pose_rate_sigma is None or obs.rate_density is None:
+        return obs
     axes = np.zeros(3, dtype=np.bool_) if sigma is None else undithered_axes(step, sigma)
     if not axes.any():
         return obs
-    poses, interval_s = obs.segments.poses, 1.0 / obs.recording.rate_hz
-    edges = np.array(obs.move_ranges, dtype=np.int64)
-    variance, hidden, shared = rounding_in_moves(obs.raw_rate, step, obs.pose_rate, axes, edges)
-    by_codes, own = biases_by_codes(obs.pose_rate, [obs.raw_rate[pose.samples()] for pose in poses], step, axes)
-    lasts_s = interval_s * np.array([pose.stop - pose.start for pose in poses])[:, None]
-    white = density_without_rounding(obs.rate_density, step, interval_s, axes) / np.sqrt(lasts_s)
+    interval_s, pose_rate = 1.0 / obs.recording.rate_hz, obs.pose_rate
+    variance, hidden, shared = rounding_in_moves(obs.raw_rate, step, pose_rate, axes, np.array(obs.move_ranges))
+    readings = [obs.raw_rate[pose.samples()] for pose in obs.segments.poses]
+    by_codes, own = biases_by_codes(pose_rate, readings, step, axes)
+    root = np.sqrt(obs.segments.duration_s)[:, None]
+    white = density_without_rounding(obs.rate_density, step, interval_s, axes) / root
     raw_rate, unresolved = obs.raw_rate.copy(), obs.unresolved.copy()
     for k, ((a, b), pair) in enumerate(zip(obs.move_ranges, obs.move_poses, strict=True)):
         # At rest inside a move an axis reads as in the poses around it.
-        before, after = (by_codes - obs.pose_rate)[pair]
+        before, after = (by_codes - pose_rate)[pair]
         raw_rate[a:b] += hidden[a:b] * np.linspace(before, after, b - a)
         # Rounding to codes that are passed through is in the noise of samples.
         beyond = variance[a:b].sum(axis=0) - (b - a) * UNIFORM * step**2
