@@ -29,6 +29,8 @@ Near = tuple[FloatArray, FloatArray, FloatArray]
 """Initial ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) and ``S_w`` (3, 3)."""
 HELD = 1e-7
 """Relative prior σ of a given accelerometer: far below any noise, and above rounding errors in the rows."""
+SHOWN = 0.1
+"""That of a gyro's scale which turns show: far above their errors, far below those of moves that do not show it."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -170,11 +172,14 @@ def _effects(
     return np.concatenate([at_rest[0], of_force]), np.concatenate([at_rest[1], of_rate])
 
 
-def with_prior(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray, *, is_given: bool) -> Observed:
+def with_prior(
+    observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray, *, is_given: bool, is_shown: bool
+) -> Observed:
     """The session with a prior on both linear models: mean ``S_a`` (3, 3) lower-triangular, ``b_a`` (3,) m/s², ``S_w``
-    (3, 3); σ is the norm of either scale, and |g| for ``b_a``. The accelerometer is fixed if it ``is_given``.
+    (3, 3); σ is the norm of either scale, and |g| for ``b_a``. The accelerometer is fixed if it ``is_given``; turns
+    show the gyro's scale if it ``is_shown``.
     """
     mean = np.concatenate([S_a[LOWER], b_a + S_a @ observed.force_origin, S_w.ravel()])
     sizes = float(np.linalg.norm(S_a, 2)), observed.gravity_m_s2, float(np.linalg.norm(S_w, 2))
-    sigma = np.repeat(sizes, (6, 3, 9)) * np.repeat((HELD if is_given else 1.0, 1.0), (9, 9))
+    sigma = np.repeat(sizes, (6, 3, 9)) * np.repeat((HELD if is_given else 1.0, SHOWN if is_shown else 1.0), (9, 9))
     return replace(observed, prior=Prior(mean, np.diag(sigma**2), is_weak=True))

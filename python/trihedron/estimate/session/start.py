@@ -47,7 +47,8 @@ class Log:
     def observed(self, measured: MoveMeasurements, used: BoolArray, near: Near) -> Observed:
         """The session with the moves ``used`` (m,)."""
         out = arranged(self.recording, self.segments, measured, self.gravity_m_s2, used, near)
-        return with_prior(out.behind_filters() if self.is_filtered else out, *near, is_given=self.is_given)
+        out = out.behind_filters() if self.is_filtered else out
+        return with_prior(out, *near, is_given=self.is_given, is_shown=self.scale is not None)
 
     def anchors_s(self, measured: MoveMeasurements) -> FloatArray:
         """(m, 2) times of the middles of the poses before and after each move [s]."""
