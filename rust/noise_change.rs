@@ -299,3 +299,43 @@ fn moves_agree(moves: &[(f64, f64, bool)], level: f64) -> Option<f64> {
     let chance = |i: usize| ((reach - i) as f64 / (moves.len() - i) as f64).ln();
     Some(-2.0 * (0..inside).map(chance).sum::<f64>())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::noise_change;
+
+    /// White noise of one sensor: sums of twelve uniform numbers of a congruential generator.
+    fn white(n: usize) -> Vec<[f64; 3]> {
+        let mut state = 7_u64;
+        let mut uniform = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            f64::from((state >> 32) as u32) / f64::from(u32::MAX) - 0.5
+        };
+        (0..n)
+            .map(|_| std::array::from_fn(|_| (0..12).map(|_| uniform()).sum()))
+            .collect()
+    }
+
+    #[test]
+    fn noise_that_is_four_times_as_large_in_some_poses_is_found_there_and_none_in_even_noise() {
+        let mut readings = white(4000);
+        let poses: Vec<_> = (0..20).map(|i| vec![[200 * i, 200 * i + 150]]).collect();
+        let moves: Vec<_> = (0..19)
+            .map(|i| ([200 * i + 150, 200 * i + 200], [i, i + 1]))
+            .collect();
+        assert!(noise_change(&readings, [0.0; 3], &poses, &moves, 6).is_none());
+        for row in &mut readings[1600..2400] {
+            *row = row.map(|x| 4.0 * x);
+        }
+        let found = noise_change(&readings, [0.0; 3], &poses, &moves, 6).expect("louder poses");
+        assert_eq!((found.first, found.last), (8, 11));
+        let each = found.ratio.iter().zip(&found.sigma);
+        assert!(each.clone().count() == 3);
+        assert!(
+            each.into_iter()
+                .all(|(ratio, sigma)| (ratio - 4.0).abs() < 4.0 * sigma)
+        );
+    }
+}
