@@ -23,6 +23,7 @@ pub mod kalman;
 pub mod levels;
 pub mod lever_arm;
 pub mod lines;
+pub mod log_sum;
 pub mod mean_noise;
 pub mod move_moments;
 pub mod move_signals;

@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::log_sum::log_sum;
 use crate::order_statistics::median;
 
 /// Differences of readings whose variances are compared, and those of white noise of variance one: the second for the
@@ -181,8 +182,7 @@ fn of_any_level(logs: &[f64], variance: f64) -> f64 {
 }
 
 fn mixed(one_level: f64, any_level: f64, share: f64) -> f64 {
-    let (a, b) = ((-share).ln_1p() + one_level, share.ln() + any_level);
-    a.max(b) + (-(a - b).abs()).exp().ln_1p()
+    log_sum([(-share).ln_1p() + one_level, share.ln() + any_level])
 }
 
 /// The likeliest share of poses with a level of their own.
@@ -281,8 +281,8 @@ fn is_noise(slow: &[Vec<f64>], fast: &[Vec<f64>], white: impl Fn(usize) -> f64) 
     away[0].min(away[1]) / (n_axes as f64) < SAME_SHAPE.ln()
 }
 
-/// Score by the moves, of power over the usual noise, independent squares, and whether inside the interval: noise of the
-/// sensor continues through those inside, whose power is then `level` at least; `None` where it does not. Without it
+/// Score by the moves, of power over the usual noise, independent squares, and whether inside the interval: the sensor's
+/// noise continues through those inside, whose power is then `level` at least; `None` where it does not. Without it
 /// they would be any of all moves.
 fn moves_agree(moves: &[(f64, f64, bool)], level: f64) -> Option<f64> {
     let inside = moves.iter().filter(|one| one.2).count();

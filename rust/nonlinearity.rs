@@ -3,6 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, Vector3};
 
 use crate::error::{Error, Result};
+use crate::log_sum::log_sum;
 use crate::order_statistics::median;
 use crate::sensor_model::LOWER;
 
@@ -228,12 +229,6 @@ pub fn of_lengths(
         log_odds,
         mean,
     })
-}
-
-/// Logarithm of a sum, from the logarithms of its terms.
-fn log_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
-    let most = terms.clone().fold(f64::NEG_INFINITY, f64::max);
-    most + terms.map(|term| (term - most).exp()).sum::<f64>().ln()
 }
 
 /// Mean of second moments, each with the logarithm of its evidence.

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 use rayon::prelude::*;
 
 use crate::chi_square::MEDIAN_SQUARE;
+use crate::log_sum::log_sum;
 use crate::order_statistics::median;
 pub use levels::{Means, levels};
 
@@ -207,7 +208,7 @@ impl Whitened {
     }
 }
 
-fn heights() -> impl Iterator<Item = f64> {
+fn heights() -> impl Iterator<Item = f64> + Clone {
     (0..N_HEIGHTS).map(|k| HIGHEST.powf(k as f64 / (N_HEIGHTS - 1) as f64))
 }
 
@@ -217,16 +218,6 @@ fn log_prior(rate: f64) -> RowDVector<f64> {
     let all: f64 = weight.iter().sum();
     let of = |n: usize| (weight[n] / all / PATHS.counts[n]).ln();
     RowDVector::from_iterator(PATHS.switches.len(), PATHS.switches.iter().map(|&n| of(n)))
-}
-
-fn log_sum(values: impl IntoIterator<Item = f64>) -> f64 {
-    let values: Vec<f64> = values.into_iter().collect();
-    let top = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    top + values
-        .iter()
-        .map(|value| (value - top).exp())
-        .sum::<f64>()
-        .ln()
 }
 
 /// What the readings of every pose, one axis, show; a pose of too few tells nothing.

@@ -9,7 +9,6 @@ from trihedron.arrays import AXES
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Effect, Evidence, Variant, acting_on, per_axis_parameters
 from trihedron.diagnose.effects.saturation import clipped_samples
-from trihedron.probability import RARE_ALARM
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not
 
@@ -18,6 +17,8 @@ MIN_SHARE = 0.1
 rotation: without an arm it leaves at most 5 % (21 simulated sessions)."""
 FEWEST_MOVES = 6
 """Twice the three unknowns of the arm: its uncertainty comes from the scatter between moves."""
+P_LIMIT = 1e-5
+"""False-alarm rate of Hotelling's test: the travel of a hand follows the rotation by chance (rust/lever_arm.rs)."""
 SMOOTHED, SMOOTHED_S = 5, 0.04
 """Window of the mean applied to both sides, samples and s: angular acceleration is a difference of noisy rates."""
 
@@ -46,7 +47,7 @@ class LeverArm(DirectEffect):
             return None
         arm, covariance, p_value, (before, after), n_moves = found
         share = 1.0 - after / before
-        if share < MIN_SHARE or p_value > RARE_ALARM:
+        if share < MIN_SHARE or p_value > P_LIMIT:
             return None
         noise = float((context.noise_floor[0] ** 2).mean())
         rms = math.sqrt(before), math.sqrt(after)
