@@ -99,7 +99,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if numbers:
         # What the package fixes differs before all else: a calibration of another device has any effect missing.
         said = [listed(numbers), *said] if is_other else [*said, f"parameters differ ({listed(numbers)})"]
-    return f"{'PARAMETERS DIFFER' if is_other else 'MISSING PHYSICS'}: {'; '.join(said)}{tail}."
+    return f"{'PARAMETERS DIFFER AND PHYSICS IS MISSING' if is_other else 'MISSING PHYSICS'}: {'; '.join(said)}{tail}."
 
 
 def poses_disagree(diagnosis: Diagnosis) -> bool:
