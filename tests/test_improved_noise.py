@@ -11,7 +11,7 @@ from scipy.stats import binom
 import trihedron
 from diagnosed_session import unit_of
 from trihedron.api import improving
-from trihedron.api.driving import MovedAlike, bias_in_moves
+from trihedron.api.driving import MovedAlike, bias_scatter
 from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.noise import sampled as sampled_of
@@ -93,14 +93,14 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     _, recording = session(3, strays=2e-3)
     clean, other = session(4)
     own = beside(recording)
-    found = bias_in_moves(clean, own)
+    found = bias_scatter(clean, own, "gyroscope")
     # Twenty moves, each of two angles: known to a sixth; four of those, and what the poses add.
     assert found == pytest.approx((2e-3,) * 3, rel=0.6)
-    again = bias_in_moves(straying_by(clean, found), own)
+    again = bias_scatter(straying_by(clean, found), own, "gyroscope")
     # Alike within a twentieth, or a small step is left.
     assert again is None or again == pytest.approx(found, rel=0.15)
     # A recording that misses no more than the scenario, but for chance (a sixth), needs little.
-    little = bias_in_moves(clean, beside(other))
+    little = bias_scatter(clean, beside(other), "gyroscope")
     assert little is None or max(little) < 0.4 * 2e-3
 
 

@@ -69,8 +69,7 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
         What to write, as JSON of its schema (docs/calibration-file.md).
     path : file
         Where to.
-    overwrite : bool
-        Replace a file that exists.
+    overwrite : bool, whether a file that exists is replaced
 
     Returns
     -------

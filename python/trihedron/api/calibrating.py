@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args
@@ -73,8 +73,7 @@ def calibrate(
     ----------
     recording : Recording, or what trihedron.read takes
         Without a gyro the accelerometer is calibrated alone.
-    segments : Segments, optional
-        Static poses and the moves between them; found when not given.
+    segments : Segments, found when not given
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place. Without it 9.80665 m/s² is used, and a finding states the possible error.
     method : "joint", "separate" or "faces"
@@ -97,10 +96,8 @@ def calibrate(
     reference : path, Recording or ReferenceMotion
         Known motion beside the log (rate table, optical tracking, another unit): both sensors are calibrated by it, and
         static poses are not needed.
-    reference_columns : str
-        Its columns, where names do not state them.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    reference_columns : str, its columns where names do not state them
+    progress : callable, called with the share done (0 to 1) and what is being done
 
     Returns
     -------
@@ -137,15 +134,16 @@ def calibrate(
         said = (*said, *reference_findings(by_motion, recording, segments)) if is_fitted else ()
         return replace(_result(by_motion, (*said, *by_motion.findings), segments, recording), reference=found)
     require_poses(recording, segments)
+    log = _Log(recording, segments, gravity, source, gyroscope_nominal)
     if method == "faces":
-        calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)
+        calibration = log.by_faces(faces, turns_deg)
         wanted: Frame = frame or "case"
     else:
         if faces is not None:
             raise InputError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         wanted = frame or "lower"
         try:
-            calibration = _by_poses(recording, segments, gravity, source, method, axis_signs, gyroscope_nominal)
+            calibration = log.by_poses(method, axis_signs)
         except InputError as error:
             # Serious findings about the log come before the error of the fit.
             grave = [f"{one.seen} {one.action}" for one in recording.findings if one.severity is Severity.SERIOUS]
@@ -200,78 +198,80 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     return (*fitted, *of_gyro, *missing)
 
 
-def _by_poses(
-    recording: Recording,
-    segments: Segments,
-    gravity: float,
-    source: str,
-    method: Method,
-    axis_signs: Sequence[int] | None,
-    nominal: float | None,
-) -> Calibration:
-    assert segments.accelerometer_mean is not None
-    assert segments.norm_sigma is not None
-    accelerometer, found = calibrate_norm(
-        segments.accelerometer_mean,
-        segments.norm_sigma,
-        gravity,
-        raw_unit=recording.accelerometer_unit,
-        axis_signs=axis_signs,
-    )
-    alone = _alone(accelerometer, found, "lower", gravity, source, recording)
-    if recording.gyroscope is None:
-        return alone
-    try:
-        # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
-        if method == "joint" and alone.is_trustworthy:
-            return calibrate_joint(recording, segments, alone, nominal)
-        gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, nominal)
-    except INPUT_ERRORS as error:
-        return _without_gyroscope(alone, error)
-    return _together(alone, gyroscope, more)
+@dataclass(frozen=True, eq=False)
+class _Log:
+    """What every method starts from; ``nominal`` is the gyro's scale [rad/s per unit]."""
 
+    recording: Recording
+    segments: Segments
+    gravity: float
+    source: str
+    nominal: float | None
 
-def _by_faces(
-    recording: Recording,
-    segments: Segments,
-    gravity: float,
-    source: str,
-    faces: Sequence[int] | None,
-    turns_deg: Sequence[float] | None,
-    nominal: float | None,
-) -> Calibration:
-    mean, sigma_mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean, segments.norm_sigma
-    unit = recording.accelerometer_unit
-    assert mean is not None
-    assert sigma_mean is not None
-    up = faces_up(mean, unit, faces)
-    shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
-    by_faces = partial(calibrate_faces, mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared)
-    try:
-        accelerometer, found = by_faces()
-    except INPUT_ERRORS:
-        if recording.gyroscope is None or turns_deg is None or sigma is None:
-            raise
-        # Stated turns about stated faces determine the gyro even without a full accelerometer.
-        accelerometer, _ = by_faces(is_square=True)
-        _, found = calibrate_norm(mean, sigma, gravity, raw_unit=unit)
-    alone = _alone(accelerometer, found, "case", gravity, source, recording)
-    if recording.gyroscope is None:
-        return alone
-    # The lean of the table is found anew beside moves.
-    found = tuple(one for one in found if one.code != "table-tilt")
-    try:
-        stated = None
-        if turns_deg is not None:
-            stated = scale_of_stated(table_turns(recording, segments, accelerometer, turns_deg))
-        # Residuals of faces are leans of the table, which poses and moves do not have.
-        near = replace(alone, accelerometer=replace(accelerometer, quality=None), findings=found)
-        session = replace(calibrate_joint(recording, segments, near, nominal, stated), frame="lower")
-        return in_case_frame(*_on_turns(session, recording, segments, turns_deg), recording, segments, up)
-    except INPUT_ERRORS as error:
-        if turns_deg is not None:
-            raise
-        return _without_gyroscope(alone, error)
+    def by_poses(self, method: Method, axis_signs: Sequence[int] | None) -> Calibration:
+        recording, segments, gravity = self.recording, self.segments, self.gravity
+        assert segments.accelerometer_mean is not None
+        assert segments.norm_sigma is not None
+        accelerometer, found = calibrate_norm(
+            segments.accelerometer_mean,
+            segments.norm_sigma,
+            gravity,
+            raw_unit=recording.accelerometer_unit,
+            axis_signs=axis_signs,
+        )
+        alone = self._alone(accelerometer, found, "lower")
+        if recording.gyroscope is None:
+            return alone
+        try:
+            # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
+            if method == "joint" and alone.is_trustworthy:
+                return calibrate_joint(recording, segments, alone, self.nominal)
+            gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, self.nominal)
+        except INPUT_ERRORS as error:
+            return _without_gyroscope(alone, error)
+        # Fitted separately: the gyro's covariance includes the accelerometer's error.
+        covariance = np.zeros((24, 24))
+        covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
+        return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*found, *more))
+
+    def by_faces(self, faces: Sequence[int] | None, turns_deg: Sequence[float] | None) -> Calibration:
+        recording, segments = self.recording, self.segments
+        mean, sigma_mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean, segments.norm_sigma
+        unit = recording.accelerometer_unit
+        assert mean is not None
+        assert sigma_mean is not None
+        up = faces_up(mean, unit, faces)
+        shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
+        by_faces = partial(calibrate_faces, mean, sigma_mean, self.gravity, up=faces, raw_unit=unit, shared=shared)
+        try:
+            accelerometer, found = by_faces()
+        except INPUT_ERRORS:
+            if recording.gyroscope is None or turns_deg is None or sigma is None:
+                raise
+            # Stated turns about stated faces determine the gyro even without a full accelerometer.
+            accelerometer, _ = by_faces(is_square=True)
+            _, found = calibrate_norm(mean, sigma, self.gravity, raw_unit=unit)
+        alone = self._alone(accelerometer, found, "case")
+        if recording.gyroscope is None:
+            return alone
+        # The lean of the table is found anew beside moves.
+        found = tuple(one for one in found if one.code != "table-tilt")
+        try:
+            stated = None
+            if turns_deg is not None:
+                stated = scale_of_stated(table_turns(recording, segments, accelerometer, turns_deg))
+            # Residuals of faces are leans of the table, which poses and moves do not have.
+            near = replace(alone, accelerometer=replace(accelerometer, quality=None), findings=found)
+            session = replace(calibrate_joint(recording, segments, near, self.nominal, stated), frame="lower")
+            return in_case_frame(*_on_turns(session, recording, segments, turns_deg), recording, segments, up)
+        except INPUT_ERRORS as error:
+            if turns_deg is not None:
+                raise
+            return _without_gyroscope(alone, error)
+
+    def _alone(self, accelerometer: SensorCalibration, found: Found, frame: Frame) -> Calibration:
+        of_log = (self.gravity, self.source, self.recording.source, self.recording.sha256)
+        return Calibration(accelerometer, None, accelerometer.covariance, frame, *of_log, findings=found)
 
 
 def _on_turns(
@@ -285,30 +285,6 @@ def _on_turns(
         turns, said = by_quarters(turns, session)
         session = replace(session, findings=(*session.findings, *said))
     return on_stated_turns(session, recording, segments, turns) if turns.moves else (session, turns)
-
-
-def _alone(
-    accelerometer: SensorCalibration, found: Found, frame: Frame, gravity: float, source: str, recording: Recording
-) -> Calibration:
-    return Calibration(
-        accelerometer=accelerometer,
-        gyroscope=None,
-        covariance=accelerometer.covariance,
-        frame=frame,
-        gravity_m_s2=gravity,
-        gravity_source=source,
-        recording_source=recording.source,
-        recording_sha256=recording.sha256,
-        findings=found,
-    )
-
-
-def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) -> Calibration:
-    """Both sensors, fitted separately: the gyro's covariance includes the accelerometer's error."""
-    covariance = np.zeros((24, 24))
-    covariance[:12, :12] = alone.accelerometer.covariance
-    covariance[12:, 12:] = gyroscope.covariance
-    return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*alone.findings, *found))
 
 
 def _without_gyroscope(alone: Calibration, error: Exception) -> Calibration:

@@ -27,8 +27,7 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     ----------
     recording : Recording, or what trihedron.read takes
         The log to check.
-    progress : callable, optional
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable, called with the share done (0 to 1) and what is being done
 
     Returns
     -------

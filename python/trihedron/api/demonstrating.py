@@ -13,13 +13,13 @@ import numpy as np
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import read
 from trihedron.api.verifying import verify
-from trihedron.arrays import FloatArray, rms_of, sigmas_of
+from trihedron.arrays import rms_of, sigmas_of
 from trihedron.errors import InputError
 from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.log import write_recording
 from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
-from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
+from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Truth
 from trihedron.records.results import CalibrationResult, DiagnosisResult, VerificationResult
 from trihedron.report.calibration import calibration_report
 from trihedron.report.demonstration import demonstration_report, with_files
@@ -47,8 +47,7 @@ def demo(
         Where logs, calibrations and reports go.
     seed : int
         Draws the unit and the effect of the second act.
-    overwrite : bool
-        Replace files of a folder that exists.
+    overwrite : bool, whether files of a folder that exists are replaced
 
     Returns
     -------
@@ -73,26 +72,27 @@ def demo(
 
 
 def demonstrate(
-    folder: Path, *, overwrite: bool = False, say: Callable[[str], None] | None = None
+    folder: Path, *, overwrite: bool = False, say: Callable[[str], None] = lambda _: None
 ) -> tuple[CalibrationResult, VerificationResult, Document]:
     """Simulate two sessions of one sensor, calibrate by the first, verify on the second, write everything to
     ``folder``; the document compares with the truth.
 
     The logs are written as CSV and read back like any log: only the final comparison uses the truth.
     """
-    notify = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
     log, stored, other = (folder / name for name in ("session.csv", "calibration.json", "second-session.csv"))
-    notify("simulating two sessions of one sensor")
+    say("simulating two sessions of one sensor")
     first, second = _session(log, 0, overwrite), _session(other, 1, overwrite)
     truth = truth_of_the_day(_scenario(0), SEED)
-    notify("calibrating by the first")
+    say("calibrating by the first")
     result = calibrate(first, latitude_deg=LATITUDE_DEG)
-    notify("verifying on the second")
+    say("verifying on the second")
     judged = verify(result, second, latitude_deg=LATITUDE_DEG)
-    notify("writing reports")
+    say("writing reports")
     write_calibration(result.calibration, stored, overwrite=overwrite)
-    write_whole(folder / "truth.json", _truth_text(truth), overwrite=overwrite)
+    names = ("accelerometer_S", "accelerometer_b", "gyroscope_S", "gyroscope_b", "gravity_m_s2", "scenario", "seed")
+    told = json.dumps({name: plain(getattr(truth, name)) for name in names}, indent=2) + "\n"
+    write_whole(folder / "truth.json", told, overwrite=overwrite)
     pages = (
         ("report.html", calibration_report(result.calibration, result.segments, first)),
         ("verification.html", verification_report(judged.verification, judged.segments, second)),
@@ -101,7 +101,10 @@ def demonstrate(
         page = with_files(page, LOG=log, FILE=stored, OTHER_LOG=other)
         write_whole(folder / name, to_html(page), overwrite=overwrite)
     comparison = compare_with_truth(result.calibration, truth)
-    before = _uncalibrated_rms(judged.segments, judged.verification.gravity_m_s2)
+    assert judged.segments.accelerometer_mean is not None
+    # By the data sheet's sensitivity and without a bias.
+    norm = np.linalg.norm(judged.segments.accelerometer_mean * (STANDARD_GRAVITY_M_S2 / COUNTS_PER_G), axis=1)
+    before = rms_of(norm - judged.verification.gravity_m_s2)
     return result, judged, demonstration_report(comparison, before, judged.verification.norm_rms, folder)
 
 
@@ -137,26 +140,16 @@ def truth_of_the_day(scenario: Scenario, seed: int) -> Truth:
     drift is the difference to the same session simulated without these terms: all other random draws are equal.
     """
     recording, truth = simulate(scenario, seed)
-    accelerometer, gyroscope = scenario.accelerometer, scenario.gyroscope
-    still = (0.0, 0.0, 0.0)
-    steady = replace(
-        scenario,
-        accelerometer=replace(accelerometer, noise=replace(accelerometer.noise, B=still, K=still, R=still)),
-        gyroscope=replace(gyroscope, noise=replace(gyroscope.noise, B=still, K=still, R=still)),
-    )
-    without, _ = simulate(steady, seed)
-    return replace(
-        truth,
-        accelerometer_b=truth.accelerometer_b
-        - truth.accelerometer_S @ _mean_change(recording.accelerometer, without.accelerometer),
-        gyroscope_b=truth.gyroscope_b - truth.gyroscope_S @ _mean_change(recording.gyroscope, without.gyroscope),
-    )
-
-
-def _mean_change(readings: FloatArray | None, without: FloatArray | None) -> FloatArray:
-    assert readings is not None
-    assert without is not None
-    return np.asarray(np.mean(readings - without, axis=0))
+    names = ("accelerometer", "gyroscope")
+    slow = dict.fromkeys("BKR", (0.0, 0.0, 0.0))
+    parts = {name: getattr(scenario, name) for name in names}
+    steady = {name: replace(part, noise=replace(part.noise, **slow)) for name, part in parts.items()}
+    without, _ = simulate(replace(scenario, **steady), seed)
+    biases = {}
+    for name in names:
+        drift = np.mean(getattr(recording, name) - getattr(without, name), axis=0)
+        biases[f"{name}_b"] = getattr(truth, f"{name}_b") - getattr(truth, f"{name}_S") @ drift
+    return replace(truth, **biases)
 
 
 def _scenario(layout: int) -> Scenario:
@@ -168,15 +161,3 @@ def _session(path: Path, layout: int, overwrite: bool) -> Recording:
     recording, _ = simulate(_scenario(layout), SEED + layout)
     write_recording(recording, path, overwrite=overwrite)
     return read(path)
-
-
-def _uncalibrated_rms(segments: Segments, gravity_m_s2: float) -> float:
-    """Rms gravity error in static poses [m/s²] without calibration: the data sheet's sensitivity and no bias."""
-    assert segments.accelerometer_mean is not None
-    norm = np.linalg.norm(segments.accelerometer_mean * (STANDARD_GRAVITY_M_S2 / COUNTS_PER_G), axis=1)
-    return rms_of(norm - gravity_m_s2)
-
-
-def _truth_text(truth: Truth) -> str:
-    names = ("accelerometer_S", "accelerometer_b", "gyroscope_S", "gyroscope_b", "gravity_m_s2", "scenario", "seed")
-    return json.dumps({name: plain(getattr(truth, name)) for name in names}, indent=2) + "\n"

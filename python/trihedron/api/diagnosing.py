@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
-from trihedron.api.diagnosing_static_log import Calibrated, diagnosed_static_log, model_of_static_log
+from trihedron.api.diagnosing_static_log import Calibrated, is_static_log
 from trihedron.api.reading import AnyRecording, accelerometer_only, recording_of, segments_of
 from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.session.starting_point import is_open, starts_nominal
+from trihedron.diagnose.session.starting_point import is_open, nominal, starts_nominal
+from trihedron.diagnose.static_log import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.gyroscope.common_scale import without_first_scale
 from trihedron.records import Calibration, Finding, Recording, Segments
+from trihedron.records.diagnosis import LinearModel
 from trihedron.records.progress import Progress
 from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
+from trihedron.segment.static_pieces import static_pieces
 
 if TYPE_CHECKING:
     from trihedron.api.diagnosing_with_simulation import GivenModel, Simulated
@@ -46,10 +49,8 @@ def diagnose(
     ----------
     recording : Recording, or what trihedron.read takes
         Poses and moves of one sensor.
-    gravity_m_s2 or latitude_deg, height_m : float
-        |g| at the place; with a ``calibration`` that of the calibration unless given.
-    segments : Segments, optional
-        Poses and moves; found when not given.
+    gravity_m_s2 or latitude_deg, height_m : float; that of the calibration unless given
+    segments : Segments, found when not given
     calibration : calibration or path, optional
         The model to compare with the recording, with its uncertainties. Without it one is fitted to the recording.
     against : Recording, Scenario or path, optional
@@ -60,10 +61,8 @@ def diagnose(
         moved along (docs/reference.md).
     alpha : float
         Probability that a healthy recording is called anything but consistent.
-    progress : callable, optional
-        Called with the share done (0 to 1) and what is being done.
-    reference_columns : str, optional
-        Its columns, where names do not state them.
+    progress : callable, called with the share done (0 to 1) and what is being done
+    reference_columns : str, its columns where names do not state them
 
     Returns
     -------
@@ -131,11 +130,18 @@ def _of_poses(
     segments = segments_of(segments, recording)
     findings += segments.findings
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
-    stated = (gravity, source)
-    model = None if against is not None else model_of_static_log(recording, segments, known, stated, calibrated)
-    if model is not None:
+    has_force = against is None and recording.accelerometer is not None
+    if has_force and is_static_log(recording, segments, calibrated):
         notify(0.1, "looking at biases and spectral lines")
-        return diagnosed_static_log(recording, segments, model, stated, (*findings,), alpha, is_given=known is not None)
+        used = nominal(recording, segments, (gravity, source)) if known is None else known
+        linear = LinearModel.of_sensors(used.accelerometer, used.gyroscope)
+        found = diagnose_static_log(recording, static_pieces(recording), linear, gravity, alpha)
+        lasts = float(recording.time_s[-1] - recording.time_s[0])
+        findings.append(Finding.of("not-fit", "few-orientations", duration_s=lasts, n_poses=segments.n_poses))
+        return DiagnosisResult(
+            **vars(found), findings=tuple(findings), gravity_source=source, model_is_given=known is not None,
+            calibration=used, own_effects=found.effects, segments=segments, recording=recording,
+        )  # fmt: skip
     simulated: Simulated | None = None
     if against is not None:
         simulated, recording, segments, more = simulated_beside(against, recording, segments, gravity, alpha, notify)

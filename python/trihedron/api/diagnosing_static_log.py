@@ -7,13 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from trihedron.api.reading import FEWEST_POSES
-from trihedron.diagnose.session.starting_point import is_open, nominal
-from trihedron.diagnose.static_log import diagnose_static_log
+from trihedron.diagnose.session.starting_point import is_open
 from trihedron.errors import INPUT_ERRORS
-from trihedron.records import Calibration, Finding, Recording, Segments
-from trihedron.records.diagnosis import LinearModel
-from trihedron.records.results import DiagnosisResult
-from trihedron.segment.static_pieces import static_pieces
+from trihedron.records import Calibration, Recording, Segments
 from trihedron.transforms import directions_of
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -26,19 +22,6 @@ MOSTLY = 0.9
 """Fraction of the static time in two orientations from which all other poses count as handling."""
 TURNED_RAD, MOST_TURNS = 0.7, 2
 """Rotation [rad] (40°) from which a move counts as a turn, and the most turns of a log of one or two orientations."""
-
-
-def model_of_static_log(
-    recording: Recording,
-    segments: Segments,
-    known: Calibration | None,
-    gravity: tuple[float, str],
-    calibrated: Calibrated,
-) -> Calibration | None:
-    """The model that converts a log of one or two orientations to SI; ``None`` where the log is a session."""
-    if recording.accelerometer is None or not is_static_log(recording, segments, calibrated):
-        return None
-    return nominal(recording, segments, gravity) if known is None else known
 
 
 def is_static_log(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
@@ -81,30 +64,3 @@ def _turns(recording: Recording, segments: Segments) -> int:
         for m in segments.moves
     ]
     return sum(angle > TURNED_RAD for angle in turned)
-
-
-def diagnosed_static_log(
-    recording: Recording,
-    segments: Segments,
-    model: Calibration,
-    gravity: tuple[float, str],
-    findings: tuple[Finding, ...],
-    alpha: float,
-    *,
-    is_given: bool,
-) -> DiagnosisResult:
-    """The diagnosis of a log of one or two orientations."""
-    linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
-    found = diagnose_static_log(recording, static_pieces(recording), linear, gravity[0], alpha)
-    lasts = float(recording.time_s[-1] - recording.time_s[0])
-    few = Finding.of("not-fit", "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
-    return DiagnosisResult(
-        **vars(found),
-        findings=(*findings, few),
-        gravity_source=gravity[1],
-        model_is_given=is_given,
-        calibration=model,
-        own_effects=found.effects,
-        segments=segments,
-        recording=recording,
-    )

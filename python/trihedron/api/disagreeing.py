@@ -72,15 +72,14 @@ EFFECTS: dict[str, Draw] = {
 
 
 def disagree(
-    folder: Path, seed: int, *, overwrite: bool = False, say: Callable[[str], None] | None = None
+    folder: Path, seed: int, *, overwrite: bool = False, say: Callable[[str], None] = lambda _: None
 ) -> tuple[DiagnosisResult, Document]:
     """Draw a unit with one effect, seal the answer, diagnose its log against a plain simulation, then open the seal.
 
     The log is written and read back like any log; the file with the answer is opened after both verdicts.
     """
-    notify = say or (lambda _sentence: None)
     folder.mkdir(parents=True, exist_ok=True)
-    notify("drawing a unit with one effect, and sealing which")
+    say("drawing a unit with one effect, and sealing which")
     gravity = normal_gravity(LATITUDE_DEG)
     scenario, sealed = _drawn(seed, gravity)
     write_whole(folder / "sealed.json", json.dumps(plain(sealed), indent=2) + "\n", overwrite=overwrite)
@@ -90,14 +89,14 @@ def disagree(
     scale = float(np.radians(1.0 / 65.5))
     write_whole(given, SIMULATION.format(gravity=gravity, scale=scale), overwrite=overwrite)
     taken = read(log)
-    notify("comparing the simulation with the log")
+    say("comparing the simulation with the log")
     found = diagnose(taken, gravity_m_s2=gravity, against=given)
     write_scenario(improve(given, found).text, better, overwrite=overwrite)
-    notify("comparing the improved simulation with the log")
+    say("comparing the improved simulation with the log")
     improved = diagnose(taken, gravity_m_s2=gravity, against=better)
     page = with_files(diagnosis_report(found, str(given), str(better)), LOG=log)
     write_whole(folder / "disagreement.html", to_html(page), overwrite=overwrite)
-    notify("opening the seal")
+    say("opening the seal")
     opened = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))
     return found, disagreement_report(found, improved, opened, folder)
 

@@ -36,6 +36,9 @@ SEED, N_SEEDS = 20, 8
 """First seed (arbitrary, fixed) and number of the simulations compared with the recording. The relative uncertainty of
 the rms error of twenty poses is a fifth for one simulation, a fifteenth for eight."""
 
+SCATTER = {"accelerometer": ("bias_repeatability", 0), "gyroscope": ("bias_in_moves", 1)}
+"""Scatter of each sensor's bias, and the error, of poses or of moves, that shows it."""
+
 
 def driven(scenario: Scenario, recording: Recording, segments: Segments, own: Calibration) -> Recording:
     """The scenario's instrument simulated with the recording's poses and moves and the scenario's own clock.
@@ -126,40 +129,27 @@ def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float
     return _scaled(part.noise.B, min(max((seen - none_of_it) / (all_of_it - none_of_it), 0.0), 1.0))
 
 
-def bias_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
-    """Accelerometer bias repeatability [m/s²] with which the simulated gravity error in poses equals the recording's.
+def bias_scatter(better: Scenario, beside: MovedAlike, sensor: str) -> tuple[float, float, float] | None:
+    """Scatter of a sensor's bias with which the simulated errors equal the recording's.
 
-    The worst pose of either side is excluded: a single disturbed pose is not bias repeatability. ``None`` where both
-    errors are equal, or where the scenario has the larger error and no scatter that could be reduced.
+    Of the accelerometer the repeatability [m/s²] by the gravity error in poses; of the gyro the departure during moves
+    [rad/s] by the tilt error after the same rotations (model-session.md, 11.8b). The worst pose or move of either side
+    is excluded: a single disturbed one is no scatter. The recording's excess is attributed to the bias, equal on all
+    axes. ``None`` where both errors are equal, or where the scenario has the larger error and no scatter that could be
+    reduced.
     """
-    part = better.accelerometer
-    if beside.poses is None:
+    key, k = SCATTER[sensor]
+    part, seen = getattr(better, sensor), (beside.poses, beside.moves)[k]
+    if seen is None:
         return None
 
     def missed(square: float) -> float | None:
-        electronics = replace(part.electronics, bias_repeatability=(math.sqrt(square),) * 3)
-        return beside.missed(replace(better, accelerometer=replace(part, electronics=electronics)))[0]
-
-    return _matched(part.electronics.bias_repeatability, beside.poses, 1.0, missed)
-
-
-def bias_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
-    """Gyro bias departure during moves [rad/s] with which the simulated tilt error equals the recording's.
-
-    Compared are tilt errors after the same rotations, the worst of either side excluded; the recording's excess is
-    attributed to the bias, equal on all axes (model-session.md, 11.8b). ``None`` where both errors are equal, or where
-    the scenario has the larger error and no departure that could be reduced.
-    """
-    part = better.gyroscope
-    if beside.moves is None:
-        return None
-
-    def missed(square: float) -> float | None:
-        electronics = replace(part.electronics, bias_in_moves=(math.sqrt(square),) * 3)
-        return beside.missed(replace(better, gyroscope=replace(part, electronics=electronics)))[1]
+        electronics = replace(part.electronics, **{key: (math.sqrt(square),) * 3})
+        return beside.missed(replace(better, **{sensor: replace(part, electronics=electronics)}))[k]
 
     # Departures σ at both ends, linear between, rotate by σT/√2 per axis; two of three axes are across the vertical.
-    return _matched(part.electronics.bias_in_moves, beside.moves, 1.0 / float(np.mean(beside.duration_s**2)), missed)
+    slope = 1.0 if sensor == "accelerometer" else 1.0 / float(np.mean(beside.duration_s**2))
+    return _matched(getattr(part.electronics, key), seen, slope, missed)
 
 
 def _scaled(terms: tuple[float, float, float], share: float) -> tuple[float, float, float]:

@@ -71,8 +71,7 @@ def filter_noise(
         the longest static interval of the log, if it lasts 20 s.
     reference : path, Recording or ReferenceMotion, optional
         Attitude, and with a position also for the accelerometer. Without it only static intervals and gravity are used.
-    reference_columns : str, optional
-        Its columns, where names do not state them.
+    reference_columns : str, its columns where names do not state them
     band_hz : float, optional
         Vibration is measured above this frequency; a quarter of the sampling rate by default.
     horizons_s : sequence of float
@@ -106,13 +105,11 @@ def filter_noise(
         static = allan(read(static))
     segments = None if static is not None and reference is not None else _segments(recording)
     own = None if segments is None else _of_rest(recording, segments)
-    if reference is None and own is None:
-        raise InputError(_no_noise(recording, segments, static))
-    known = _static(static) if static is not None else _sensors(own)
     # The log's own rest is no other log: its faults are those of the recording already.
-    name = "" if static is None else _name(static)
-    of_own = () if own is None else own.findings
-    of_static = [f for f in of_own if f.code in NOT_OF_THE_SENSOR] if static is None else _doubts(static, name)
+    of_own = () if own is None else tuple(f for f in own.findings if f.code in NOT_OF_THE_SENSOR)
+    known, of_static, name = (_sensors(own), of_own, "") if static is None else _given(static)
+    if reference is None and own is None:
+        raise InputError(_no_noise(recording, segments, has_static=static is not None))
     findings = (*recording.findings, *of_static, *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
@@ -129,18 +126,8 @@ def filter_noise(
         findings = (*findings, Finding.of("filter-noise-static"), *too_sure(tilt))
     if static is not None:
         findings = (*findings, *unlike_this_log(known, _sensors(own), sensors, name))
-    return FilterNoise(
-        sensors,
-        recording.source,
-        source,
-        recording.rate_hz,
-        band,
-        recording.duration_s,
-        tilt,
-        intervals,
-        tuple(findings),
-        name,
-    )
+    of_log = (recording.source, source, recording.rate_hz, band, recording.duration_s)
+    return FilterNoise(sensors, *of_log, tilt, intervals, tuple(findings), name)
 
 
 def _check(recording: Recording, horizons: Sequence[float], band_hz: float | None) -> None:
@@ -153,8 +140,8 @@ def _check(recording: Recording, horizons: Sequence[float], band_hz: float | Non
         )
 
 
-def _no_noise(recording: Recording, segments: Segments | None, static: Noise | str | os.PathLike[str] | None) -> str:
-    """All that is missing where a log shows no noise of its own; with a reference counts do."""
+def _no_noise(recording: Recording, segments: Segments | None, *, has_static: bool) -> str:
+    """All that is missing where a log shows no noise of its own."""
     missing = []
     if rate_to_si(recording.gyroscope_unit) is None:
         missing.append("its readings are counts of unknown size (`trihedron apply CALIBRATION LOG` makes them SI)")
@@ -162,10 +149,8 @@ def _no_noise(recording: Recording, segments: Segments | None, static: Noise | s
         missing.append(f"the sensor is not static in it for {LEAST_S:.0f} s")
     why = ", and ".join(missing) or "its static interval has no white noise"
     remedy = "; for static values run `trihedron allan` on a static log of ten minutes or more"
-    if static is not None:
+    if has_static:
         remedy = "; static values alone are those of `trihedron allan`"
-        if isinstance(static, Noise) and not _sensors(static):
-            remedy += f". Beside a reference, too, {_in_counts(static)}"
     return (
         f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
         f"beside it (--reference){remedy}."
@@ -215,46 +200,29 @@ def _sensors(found: Noise | None) -> Static:
     return {sensor: one for sensor, one in stated.items() if one is not None}
 
 
-def _static(given: Noise | str | os.PathLike[str]) -> Static:
-    """Static noise by sensor, from what was given."""
-    if isinstance(given, str | os.PathLike):
-        figures, _ = read_noise(given)
-        return {name: StaticNoise(_bounded(one.N), _bounded(one.K)) for name, one in figures.items()}
-    if not isinstance(given, Noise):
+def _given(static: Noise | str | os.PathLike[str]) -> tuple[Static, tuple[Finding, ...], str]:
+    """Noise by sensor of a static log, findings on what makes it doubtful, and the log as an argument."""
+    if isinstance(static, str | os.PathLike):
+        figures, _ = read_noise(static)
+        known = {name: StaticNoise(_bounded(one.N), _bounded(one.K)) for name, one in figures.items()}
+        name, said = shlex.quote(os.fspath(static)), read_noise_findings(static)
+    elif isinstance(static, Noise):
+        known, name, said = _sensors(static), as_arguments(static.source), static.findings
+    else:
         raise WrongTypeError(
-            f"static is what trihedron.allan found, or the name of a file, not {type(given).__name__}."
+            f"static is what trihedron.allan found, or the name of a file, not {type(static).__name__}."
         )
-    known = _sensors(given)
     if not known:
-        raise InputError(f"{given.source}: {_in_counts(given)}.")
-    return known
-
-
-def _in_counts(static: Noise) -> str:
-    return (
-        f"the static log is in counts: give the JSON of `trihedron allan {_name(static)}` with --calibration FILE, or "
-        "with --gyro-lsb and --accel-lsb, the sizes of a count"
-    )
-
-
-def _name(static: Noise | str | os.PathLike[str]) -> str:
-    """The static log as an argument."""
-    return as_arguments(static.source) if isinstance(static, Noise) else shlex.quote(os.fspath(static))
-
-
-def _doubts(static: Noise | str | os.PathLike[str], name: str) -> tuple[Finding, ...]:
-    """Serious findings on a static log, under its ``name``, and those of what is in its K beside noise."""
-    said = static.findings if isinstance(static, Noise) else read_noise_findings(static)
-    return tuple(
-        Finding.of(
-            "filter-noise-static",
-            "doubted" if one.severity is Severity.SERIOUS else "noted",
-            name=name,
-            seen=words("quoted", sentence=one.seen),
+        raise InputError(
+            f"{name}: the static log is in counts: give the JSON of `trihedron allan {name}` with --calibration FILE, "
+            "or with --gyro-lsb and --accel-lsb, the sizes of a count."
         )
-        for one in said
-        if one.severity is Severity.SERIOUS or one.code in NOT_OF_THE_SENSOR
-    )
+    doubts = []
+    for one in said:
+        if one.severity is Severity.SERIOUS or one.code in NOT_OF_THE_SENSOR:
+            is_grave, seen = one.severity is Severity.SERIOUS, words("quoted", sentence=one.seen)
+            doubts.append(Finding.of("filter-noise-static", "doubted" if is_grave else "noted", name=name, seen=seen))
+    return known, tuple(doubts), name
 
 
 def _bounded(figure: NoiseFigure) -> Bounded:

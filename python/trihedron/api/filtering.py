@@ -65,12 +65,9 @@ def kalman(
         Without it, the noise inside the poses.
     frame : "lower" or "symmetric"
         Body frame where there is no reference; with one it is the frame of the reference.
-    segments : Segments, optional
-        Poses; found when not given.
-    gravity_m_s2 or latitude_deg, height_m : float
-        |g| at the place [m/s²], or the place from which it follows (degrees, m).
-    progress : callable, optional
-        Called with the share done (0 to 1) and what is being done.
+    segments : Segments, found when not given
+    gravity_m_s2 or latitude_deg, height_m : float, as for :func:`calibrate`
+    progress : callable, called with the share done (0 to 1) and what is being done
 
     Returns
     -------

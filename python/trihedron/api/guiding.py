@@ -54,7 +54,7 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
     calibration = None if segments.n_poses < 6 else own_calibration(recording, segments, gravity_m_s2)
     centre, matrix = _rough_model(recording, segments, calibration)
     up = _unit((_means(segments) - centre) @ matrix.T)
-    known = _known(recording, segments, calibration, up, matrix, gravity_m_s2)
+    known = _known(recording, segments, calibration, up, (centre, matrix, gravity_m_s2))
     now_a, now_g = _now(calibration, gravity_m_s2)
     # The ratio of the fit's uncertainty to the planned one (correlated poses, noise too small) is assumed to persist.
     ratio_a = _ratio(now_a, known.accelerometer)
@@ -109,19 +109,14 @@ def part_of(recording: Recording, start_s: float, stop_s: float) -> Recording:
 
 
 def conclude(
-    recording: Recording,
-    cut_s: float | None,
-    *,
-    gravity_m_s2: float | None = None,
-    latitude_deg: float | None = None,
-    height_m: float | None = None,
+    recording: Recording, cut_s: float | None, **place: float | None
 ) -> tuple[CalibrationResult, VerificationResult | None]:
-    """Calibrate from the samples before ``cut_s`` and verify on the later ones.
+    """Calibrate from the samples before ``cut_s`` and verify on the later ones; ``place`` as for ``calibrate``.
 
     Raises ``InputError`` when the samples do not determine a calibration.
     """
     before = recording if cut_s is None else part_of(recording, -np.inf, cut_s)
-    result = calibrate(before, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
+    result = calibrate(before, **place)  # type: ignore[arg-type]
     if cut_s is None or cut_s >= recording.time_s[-1]:
         return result, None
     # The check includes the last pose of the calibration: its first move starts there.
@@ -179,13 +174,13 @@ def _known(
     segments: Segments,
     calibration: Calibration | None,
     up: FloatArray,
-    matrix: FloatArray,
-    gravity: float,
+    model: tuple[FloatArray, FloatArray, float],
 ) -> Known:
     """Planned covariances from the orientations of the poses, the paths of the moves and the noise; no fit needed."""
+    centre, matrix, gravity = model
     relative = np.full(len(up), 1e-3)
     if segments.norm_sigma is not None and len(up):
-        length = np.linalg.norm((_means(segments) - _centre_of(segments, up)) @ matrix.T, axis=1)
+        length = np.linalg.norm((_means(segments) - centre) @ matrix.T, axis=1)
         size = gravity if _is_determined(calibration) else float(np.median(length)) or 1.0
         relative = np.sqrt(np.mean((segments.norm_sigma @ np.abs(matrix).T) ** 2, axis=1)) / size
     relative = np.maximum(relative, 1e-6)
@@ -211,16 +206,6 @@ def _known(
         information += design.T @ design
     gyroscope: FloatArray = np.asarray(np.linalg.inv(information), dtype=np.float64)
     return Known(up, accelerometer, gyroscope, pose, sigma)
-
-
-def _centre_of(segments: Segments, up: FloatArray) -> FloatArray:
-    means = _means(segments)
-    if len(means) < 4:
-        return np.zeros(3)
-    # Mean reading = centre + scale · up, with both equal on all axes, by least squares.
-    design = np.column_stack([np.ones(len(up) * 3), up.ravel()])
-    offset = np.linalg.lstsq(design, means.ravel(), rcond=None)[0][0]
-    return np.full(3, float(offset))
 
 
 def _now(calibration: Calibration | None, gravity: float) -> tuple[FloatArray, FloatArray]:

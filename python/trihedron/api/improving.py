@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from trihedron.api.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
+from trihedron.api.driving import SCATTER, MovedAlike, bias_scatter, flicker_of_poses
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.frames import AIMED_AT
@@ -63,7 +64,9 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     given = read_scenario(scenario)
     tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}
     _numbers(tables, given, found)
-    _gravity(tables, given, found)
+    # Smaller differences are below the last printed digit of a latitude.
+    if abs(given.environment.gravity - found.gravity_m_s2) > 1e-4:
+        tables["environment"]["gravity_m_s2"] = found.gravity_m_s2
     _noise(tables, given, found)
     ranged = _ranges(tables, given, found)
     physics = [effect for effect in found.effects if effect.side == "recording" and effect.id not in ranged]
@@ -78,11 +81,9 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
         beside = MovedAlike(found.recording, found.segments, own)
         # First flicker that octaves show and poses do not. Then poses before moves: an accelerometer bias in a pose
         # also tilts the gravity by which moves are judged.
-        for sensor, table, key, of in (
-            ("accelerometer", "noise", "B", flicker_of_poses),
-            ("accelerometer", "electronics", "bias_repeatability", bias_of_poses),
-            ("gyroscope", "electronics", "bias_in_moves", bias_in_moves),
-        ):
+        found_by = [("accelerometer", "noise", "B", flicker_of_poses)]
+        found_by += [(s, "electronics", key, partial(bias_scatter, sensor=s)) for s, (key, _) in SCATTER.items()]
+        for sensor, table, key, of in found_by:
             found_value = of(scenario_from_table(parse_toml(text)), beside)
             if found_value is not None:
                 tables[sensor].setdefault(table, {})[key] = list(found_value)
@@ -189,12 +190,6 @@ def _mean_drift(found: DiagnosisResult, effect_id: str) -> FloatArray:
     since_s = found.segments.time_mid_s - found.recording.time_s[0]
     drifts = [np.average(Drift(**size).at(since_s), axis=0, weights=found.segments.duration_s) for _, size in sizes]
     return np.asarray(sum(drifts, np.zeros(3)))
-
-
-def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
-    # Smaller differences are below the last printed digit of a latitude.
-    if abs(given.environment.gravity - found.gravity_m_s2) > 1e-4:
-        tables["environment"]["gravity_m_s2"] = found.gravity_m_s2
 
 
 def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:

@@ -52,8 +52,7 @@ def guide(
         Poses and moves.
     accuracy : str
         When to stop: ``"accel 0.05 %, gyro 0.1 %"``.
-    gravity_m_s2 or latitude_deg, height_m : float
-        |g| at the place [m/s²], or the place from which it follows (degrees, m).
+    gravity_m_s2 or latitude_deg, height_m : float, as for :func:`calibrate`
     on_pose : callable, optional
         Called with the guide's view (instruction, next pose, uncertainties) after every pose.
 

@@ -61,14 +61,12 @@ def calibrate_sessions(
         through all of them.
     labels : sequence of str, optional
         One word per recording, instead of its date or device.
-    gravity_m_s2 or latitude_deg, height_m : float
-        As for :func:`calibrate`.
+    gravity_m_s2 or latitude_deg, height_m : float, as for :func:`calibrate`
     frame : "lower" or "symmetric"
         Body frame of the common calibration.
     alpha : float
         Probability that any parameter of a unit that did not change is called changed.
-    progress : callable, optional
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable, called with the share done (0 to 1) and what is being done
 
     Returns
     -------

@@ -76,8 +76,7 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
         A session with poses and both sensors.
     calibration : result of a calibration, Calibration or file
         Of its unit.
-    seed : int
-        Draws the noise.
+    seed : int, of the noise
 
     Returns
     -------

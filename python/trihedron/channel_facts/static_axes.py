@@ -11,13 +11,12 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, low_passes, undisturbed
-from trihedron.channel_facts.pooled import Pooled, as_measured, pooled_logarithm, robust_poses, root_of
+from trihedron.channel_facts.pooled import Pooled, pooled_logarithm, robust_poses
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.errors import InputError
 from trihedron.probability import RARE_ALARM, chdtri
 from trihedron.ranges import Range, ranges_of
 from trihedron.records.channel_facts import LowPass
-from trihedron.records.pose_noise import PoseLine
 from trihedron.transforms import cosine_transform
 
 PROBED = 1 << 14
@@ -92,7 +91,6 @@ class StaticAxis:
 
     parts: list[FloatArray]
     step: float
-    lines: tuple[PoseLine, ...]
     pooled: Pooled
     spectrum: Spectrum
 
@@ -105,17 +103,17 @@ class StaticAxis:
         step = adc_step(np.concatenate(parts))
         keep = robust_poses(*_power_of(parts))
         parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
-        # A line is reported as such; it is neither white noise nor a filter's corner.
+        # A line is neither white noise nor a filter's corner.
         spectrum = _segments(parts, rate_hz)
-        lines = lines_of_poses(*spectrum, rate_hz)
+        lines = lines_of_poses(*spectrum)
         if lines:
             parts = without_lines(parts, lines, rate_hz)
             spectrum = _segments(parts, rate_hz)
         # Correlation and tails are those of the remaining poses: a disturbed one would change them for all.
         pooled = pooled_logarithm(*_power_of(parts))
         whole = Spectrum(*_segments(parts, rate_hz, most=True), step**2 / 12.0 / rate_hz, pooled.scatter)
-        beside = whole.beside([line.frequency_hz for line in lines])
-        return cls(parts, step, lines, pooled, undisturbed(beside, rate_hz))
+        beside = whole.beside(lines)
+        return cls(parts, step, pooled, undisturbed(beside, rate_hz))
 
     @property
     def rounding(self) -> float:
@@ -184,8 +182,8 @@ FINER = 16
 """Frequencies tried per ordinate: half a step off its frequency a line loses at most 1/250 of its amplitude."""
 
 
-def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz: float) -> tuple[PoseLine, ...]:
-    """Ordinates above their neighbourhood; the lowest eight, of few periods per segment, are excluded."""
+def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int) -> list[float]:
+    """Frequencies [Hz] of ordinates above their neighbourhood, without the lowest eight of few periods per segment."""
     n = len(power)
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
     centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
@@ -193,7 +191,7 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
     limit = chdtri(count, RARE_ALARM / n) / count
     # The relative error of the neighbourhood's median is 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
-    out: list[PoseLine] = []
+    out: list[float] = []
     taken = np.zeros(n, dtype=bool)
     taken[:8] = True
     for i in np.argsort(-ratio).tolist():
@@ -201,20 +199,13 @@ def lines_of_poses(frequency: FloatArray, power: FloatArray, count: int, rate_hz
             break
         if taken[i]:
             continue
-        near = slice(max(0, i - 3), min(n, i + 4))
-        taken[near] = True
-        floor = float(level[i] / centre)
-        excess = float(np.sum(power[near] - floor))
-        # Power of an ordinate over twice the duration of its segment.
-        square = 2.0 * max(excess, float(power[i] - floor)) * rate_hz / (n + 1)
-        sigma_log = math.sqrt(2.0 / count) * math.sqrt(1.0 + 7.0 * (floor / max(excess, floor)) ** 2)
-        amplitude = root_of(as_measured(square, sigma_log, math.inf), 1.0)
-        out.append(PoseLine(float(frequency[i]), amplitude, float(ratio[i])))
-    return tuple(sorted(out, key=lambda line: line.frequency_hz))
+        taken[max(0, i - 3) : i + 4] = True
+        out.append(float(frequency[i]))
+    return sorted(out)
 
 
-def without_lines(parts: Sequence[FloatArray], lines: Sequence[PoseLine], rate_hz: float) -> list[FloatArray]:
-    """Poses (n,) each, less sinusoids at the frequencies of ``lines``, with size and phase fitted to each piece.
+def without_lines(parts: Sequence[FloatArray], lines: Sequence[float], rate_hz: float) -> list[FloatArray]:
+    """Poses (n,) each, less sinusoids at the frequencies ``lines`` [Hz], with size and phase fitted to each piece.
 
     The residuals are scaled for the two degrees of freedom of a line: white noise keeps its power.
     """
@@ -222,7 +213,7 @@ def without_lines(parts: Sequence[FloatArray], lines: Sequence[PoseLine], rate_h
     for line in lines:
         pieces = [piece for part in out for piece in _pieces(part)]
         width = rate_hz / (2.0 * float(np.median([len(piece) for piece in pieces])))
-        tried = line.frequency_hz + width * np.arange(-FINER, FINER + 1) / FINER
+        tried = line + width * np.arange(-FINER, FINER + 1) / FINER
         tried = tried[(tried > 0.0) & (tried < 0.5 * rate_hz)] / rate_hz
         power = np.sum([_explained(piece, tried) for piece in pieces], axis=0)
         frequency = float(tried[int(np.argmax(power))])

@@ -1,9 +1,11 @@
 """Frame of a simulated log's readings (rates in the world frame, gravity upside down), and its errors in motion."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,6 +22,9 @@ from trihedron.simulate import Scenario
 from trihedron.transforms import directions_of
 from trihedron.units import rate_to_si
 
+if TYPE_CHECKING:
+    from trihedron.api.driving import MovedAlike
+
 AIMED_AT = (0.9, 1.1)
 """Ratio of the gravity errors in poses and moves, simulation over recording, within which the two are alike."""
 FIRST_SEED = 60
@@ -32,17 +37,7 @@ OPEN_P = 0.1
 What = Literal["poses", "moves"]
 
 
-class Moved(Protocol):
-    """Mean square errors of a recording's poses [(m/s²)²] and moves [rad²], and of scenarios with its motion."""
-
-    poses: float | None
-    moves: float | None
-
-    def missed_by(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
-        """The same errors for one simulation with its own calibration."""
-
-
-def judged_by_motion(found: Diagnosis, scenario: Scenario, beside: Moved, alpha: float) -> Diagnosis:
+def judged_by_motion(found: Diagnosis, scenario: Scenario, beside: MovedAlike, alpha: float) -> Diagnosis:
     """A ``consistent`` diagnosis of a scenario, tested against simulations with the recording's motion.
 
     Noise inside poses does not show bias changes between them. A ratio that chance does not explain makes the verdict
@@ -57,7 +52,7 @@ def judged_by_motion(found: Diagnosis, scenario: Scenario, beside: Moved, alpha:
     return replace(found, verdict=verdict, noise_compared=(*found.noise_compared, *rows))
 
 
-def missed_alike(scenario: Scenario, beside: Moved, alpha: float) -> tuple[NoiseDifference, ...]:
+def missed_alike(scenario: Scenario, beside: MovedAlike, alpha: float) -> tuple[NoiseDifference, ...]:
     """Ratios of the errors of poses and moves, scenario over recording, each with its interval.
 
     If both are alike the recording is one more draw: the logarithm of its root mean square then differs from the mean

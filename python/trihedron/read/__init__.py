@@ -11,14 +11,3 @@ from trihedron.read.errors import ReadError
 from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
 from trihedron.records.progress import Progress
-
-__all__ = [
-    "ChunkedLog",
-    "Progress",
-    "ReadError",
-    "devices_of",
-    "open_chunks",
-    "read_axis_noise",
-    "read_pose_table",
-    "read_recording",
-]

@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.errors import InputError
-from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
+from trihedron.records.checked import Checked, numbers_of
 from trihedron.records.finding import Finding, Judged
-from trihedron.records.frozen import Frozen, freeze
+from trihedron.records.frozen import Frozen
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
 
@@ -85,7 +85,7 @@ class FitQuality(Frozen):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SensorCalibration(Frozen):
+class SensorCalibration(Checked):
     """Direct model of one sensor: ``truth = S raw + b``, raw unit → SI.
 
     Attributes
@@ -126,11 +126,7 @@ class SensorCalibration(Frozen):
                 raise ValueError(f"{name} must be finite with shape {shape}, got shape {array.shape}")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        for name in ("raw_unit", "si_unit", "method"):
-            kind_of(name, getattr(self, name), str)
-        kind_of("quality", self.quality, FitQuality, type(None))
-        kind_of("observability", self.observability, Observability, type(None))
-        freeze(self)
+        super().__post_init__()
 
     @property
     def sigma_S(self) -> FloatArray:
@@ -154,7 +150,7 @@ class SensorCalibration(Frozen):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Judged, Presented):
+class Calibration(Checked, Judged, Presented):
     """Both sensors in one body frame (instrument frame), with gravity, source recording and findings.
 
     Attributes
@@ -198,24 +194,15 @@ class Calibration(Judged, Presented):
     averaging: float = 0.0
 
     def __post_init__(self) -> None:
-        number_of("averaging", self.averaging)
-        kind_of("accelerometer", self.accelerometer, SensorCalibration)
-        kind_of("gyroscope", self.gyroscope, SensorCalibration, type(None))
-        if not isinstance(self.frame, str) or self.frame not in get_args(Frame):
-            raise WrongTypeError(f"frame is {', '.join(get_args(Frame))}, not {said(self.frame)}.")
-        for name in ("gravity_source", "recording_source", "recording_sha256"):
-            kind_of(name, getattr(self, name), str)
-        all_of("findings", self.findings, Finding)
-        kind_of("extensions", self.extensions, dict, MappingProxyType)
+        super().__post_init__()
         n = 12 if self.gyroscope is None else 24
-        covariance = np.array(numbers_of("covariance", self.covariance), dtype=np.float64)
+        covariance = np.array(self.covariance, dtype=np.float64)
         if covariance.shape != (n, n):
             raise ValueError(f"covariance must have shape ({n}, {n}), got {covariance.shape}")
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
-        if not 1.0 < number_of("gravity_m_s2", self.gravity_m_s2) < 100.0:
+        if not 1.0 < self.gravity_m_s2 < 100.0:
             raise InputError(f"gravity must be in m/s², got {self.gravity_m_s2}")
-        freeze(self)
 
     @property
     def sensors(self) -> list[tuple[str, SensorCalibration]]:

@@ -2,14 +2,18 @@
 
 import math
 from contextlib import suppress
+from dataclasses import fields
 from enum import Enum
+from functools import cache
 from numbers import Real
-from typing import Any, TypeVar
+from types import MappingProxyType, NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.errors import InputError
+from trihedron.records.frozen import Frozen, freeze
 
 LONGEST_SHOWN = 60
 """Longest text of a wrong value that an error message repeats, in characters."""
@@ -73,15 +77,45 @@ def word_of(name: str, value: Any, kind: type[Word]) -> Word:
     raise WrongTypeError(f"{name} is {listed}, not {said(value)}.")
 
 
-def kind_of(name: str, value: Any, *kinds: type) -> None:
-    """Raise unless the value is an instance of one of the classes."""
+class Checked(Frozen):
+    """Base of a frozen dataclass whose fields are checked against their types where it is made."""
+
+    def __post_init__(self) -> None:
+        for name, kind in _kinds(type(self)):
+            object.__setattr__(self, name, _settled(name, getattr(self, name), kind))
+        freeze(self)
+
+
+@cache
+def _kinds(record: type) -> list[tuple[str, Any]]:
+    hints = get_type_hints(record)
+    return [(one.name, hints[one.name]) for one in fields(record)]
+
+
+def _settled(name: str, value: Any, kind: Any) -> Any:
+    """The value of an annotated field: numbers as an array, a word as a member of its enumeration."""
+    outer, inner = get_origin(kind), get_args(kind)
+    if outer in (Union, UnionType):
+        return None if value is None else _settled(name, value, next(one for one in inner if one is not NoneType))
+    if outer is Literal and not (isinstance(value, str) and value in inner):
+        raise WrongTypeError(f"{name} is one of {', '.join(inner)}, not {said(value)}.")
+    if outer is np.ndarray:
+        return numbers_of(name, value)
+    if outer is MappingProxyType:
+        _check_kind(name, value, dict, MappingProxyType)
+    elif outer is tuple:
+        _check_kind(name, value, tuple, list)
+        for k, one in enumerate(value if isinstance(inner[0], type) else ()):
+            _check_kind(f"{name}[{k}]", one, inner[0])
+    elif kind in (float, int):
+        number_of(name, value)
+    elif isinstance(kind, type) and issubclass(kind, Enum):
+        return word_of(name, value, kind)
+    elif isinstance(kind, type) and kind is not bool:
+        _check_kind(name, value, kind)
+    return value
+
+
+def _check_kind(name: str, value: Any, *kinds: type) -> None:
     if not isinstance(value, kinds):
-        wanted = " or ".join("None" if kind is type(None) else f"a {kind.__name__}" for kind in kinds)
-        raise WrongTypeError(f"{name} is {wanted}, not {said(value)}.")
-
-
-def all_of(name: str, values: Any, kind: type) -> None:
-    """Raise unless the value is a tuple or list of instances of one class."""
-    kind_of(name, values, tuple, list)
-    for k, value in enumerate(values):
-        kind_of(f"{name}[{k}]", value, kind)
+        raise WrongTypeError(f"{name} is {' or '.join(f'a {kind.__name__}' for kind in kinds)}, not {said(value)}.")

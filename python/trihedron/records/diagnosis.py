@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal
 
 from trihedron.arrays import FloatArray
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, said
+from trihedron.records.checked import Checked
 from trihedron.records.domains import Domain, DomainResiduals, DomainTest, HeldOut
-from trihedron.records.frozen import Frozen, freeze
+from trihedron.records.frozen import Frozen
 from trihedron.records.plain import Layout, Plain, as_plain
 
 Verdict = Literal["consistent", "parameters-differ", "missing-physics", "unexplained", "not-testable"]
@@ -75,13 +75,10 @@ class AcceptedEffect(Frozen, Plain):
     curves: tuple[EffectCurve, ...] = ()
     LAYOUT: ClassVar[Layout] = Layout(
         {"side": "in", "held_out": "heldout_all"},
-        (
-            "id", "in", "share", "statement", "parameters", "p_adjusted", "delta_bic", "heldout", "heldout_all",
-            "confounded_with", "separating_experiment", "model",
-        ),
         # The most improved domain, beside every domain touched.
         lambda effect, made: {"heldout": made["heldout_all"][0] if effect.held_out else None},
-    )  # fmt: skip
+        ("curves",),
+    )
 
 
 @dataclass(frozen=True)
@@ -150,12 +147,7 @@ class Relation(Plain):
     resembles: tuple[str, ...] = ()
     experiment: str = ""
     statement: str = ""
-    LAYOUT: ClassVar[Layout] = Layout(
-        {"held_out": "heldout"},
-        (
-            "sensor", "depends_on", "form", "coefficients", "share", "heldout", "resembles", "experiment", "statement",
-        ),
-    )  # fmt: skip
+    LAYOUT: ClassVar[Layout] = Layout({"held_out": "heldout"})
 
 
 @dataclass(frozen=True)
@@ -221,7 +213,7 @@ class LinearModel(Frozen, Plain):
 
 
 @dataclass(frozen=True)
-class Diagnosis(Frozen, Plain):
+class Diagnosis(Checked, Plain):
     """Where a recording and its model differ, which effects are missing, and what is unexplained (schema version 3).
 
     Attributes
@@ -275,39 +267,13 @@ class Diagnosis(Frozen, Plain):
     stages: tuple[Stage, ...] = ()
     LAYOUT: ClassVar[Layout] = Layout(
         {"noise": "noise_model", "noise_compared": "noise"},
-        (
-            "schema_version", "verdict", "domains", "effects", "remaining", "candidates", "calibration", "parameters",
-            "noise", "noise_model", "relations", "stages", "gravity_m_s2", "alpha", "recording", "references",
-            "residuals",
-        ),
         lambda _, made: {
             "schema_version": SCHEMA_VERSION,
             "calibration": {name: made[name] for name in ("baseline", "extended")},
             "recording": {name: made[f"recording_{name}"] for name in ("source", "sha256")},
         },
-    )  # fmt: skip
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.verdict, str) or self.verdict not in get_args(Verdict):
-            raise WrongTypeError(f"verdict is one of {', '.join(get_args(Verdict))}, not {said(self.verdict)}.")
-        for name in ("domains", "remaining"):
-            all_of(name, getattr(self, name), DomainTest)
-        all_of("effects", self.effects, AcceptedEffect)
-        all_of("candidates", self.candidates, Candidate)
-        for name in ("baseline", "extended"):
-            kind_of(name, getattr(self, name), LinearModel)
-        for name in ("noise", "references"):
-            kind_of(name, getattr(self, name), dict, MappingProxyType)
-        for name in ("gravity_m_s2", "alpha"):
-            number_of(name, getattr(self, name))
-        for name in ("recording_source", "recording_sha256"):
-            kind_of(name, getattr(self, name), str)
-        all_of("residuals", self.residuals, DomainResiduals)
-        all_of("parameters", self.parameters, ParameterDifference)
-        all_of("noise_compared", self.noise_compared, NoiseDifference)
-        all_of("relations", self.relations, Relation)
-        all_of("stages", self.stages, Stage)
-        freeze(self)
+        ("baseline", "extended", "recording_source", "recording_sha256"),
+    )
 
     @property
     def predicted(self) -> tuple[tuple[StageDomain, StageDomain], ...]:

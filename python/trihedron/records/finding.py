@@ -11,8 +11,7 @@ from types import MappingProxyType
 from typing import Any, Protocol
 
 from trihedron.answers import ask
-from trihedron.records.checked import kind_of, word_of
-from trihedron.records.frozen import Frozen, freeze
+from trihedron.records.checked import Checked
 from trihedron.records.plain import Plain
 
 
@@ -29,7 +28,7 @@ class Severity(str, Enum):
 
 
 @dataclass(frozen=True)
-class Finding(Frozen, Plain):
+class Finding(Checked, Plain):
     """One problem or remark about a log or a result.
 
     Attributes
@@ -55,13 +54,6 @@ class Finding(Frozen, Plain):
     cause: str = ""
     action: str = ""
     numbers: MappingProxyType[str, float] = field(default_factory=lambda: MappingProxyType({}))
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "severity", word_of("severity", self.severity, Severity))
-        for name in ("code", "seen", "cause", "action"):
-            kind_of(name, getattr(self, name), str)
-        kind_of("numbers", self.numbers, dict, MappingProxyType)
-        freeze(self)
 
     @classmethod
     def of(

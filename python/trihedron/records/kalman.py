@@ -139,8 +139,8 @@ class AxisKalmanResult:
 
     ``innovation``, ``innovation_sigma`` (n,) [raw] are reading minus one-step prediction and its standard deviation;
     ``nis``, their squared ratio, is chi-square with one degree of freedom where the noise model is right and
-    ``is_settled`` (n,) (before, the diffuse prior predicts nothing). ``drift``, ``drift_sigma`` (n,) is the slow noise
-    at the end of each pose given the readings so far, ``smoothed_drift`` given all of them. ``batch`` holds the batch
+    ``is_settled`` (n,) (before, the diffuse prior predicts nothing). ``drift`` (n,) is the slow noise at the end of
+    each pose given the readings so far, ``smoothed_drift`` given all of them. ``batch`` holds the batch
     solutions as ``(constants, sigma)``.
     """
 
@@ -154,7 +154,6 @@ class AxisKalmanResult:
     innovation_sigma: FloatArray
     is_settled: npt.NDArray[np.bool_]
     drift: FloatArray
-    drift_sigma: FloatArray
     smoothed_drift: FloatArray
     smoothed_drift_sigma: FloatArray
     consistency: Consistency
@@ -206,9 +205,7 @@ class KalmanCalibration(Judged, Frozen):
     axes: tuple[AxisKalmanResult, ...]
     accelerometer: SensorCalibration
     references: FloatArray
-    readings: FloatArray
     start_s: FloatArray
-    pose_s: FloatArray
     residual_m_s2: FloatArray
     findings: tuple[Finding, ...] = ()
 
@@ -229,18 +226,16 @@ class NormKalmanCalibration(Frozen):
     """Calibration of a triad by the filter that uses only |g|, without reference attitudes.
 
     ``parameters``, ``sigma`` (n, 12) are S row by row, then b, as estimated after every pose; ``accelerometer`` holds
-    the final ones. ``innovation``, ``innovation_sigma`` (n,) [m/s²] are of the last of ``n_runs`` runs over all poses
-    (0: not converged, with a finding). ``residual_m_s2`` (n,) is the calibrated norm minus |g|.
+    the final ones. ``innovation``, ``innovation_sigma`` (n,) [m/s²] are of the last run over all poses.
+    ``residual_m_s2`` (n,) is the calibrated norm minus |g|.
     """
 
     accelerometer: SensorCalibration
-    gravity_m_s2: float
     parameters: FloatArray
     sigma: FloatArray
     innovation: FloatArray
     innovation_sigma: FloatArray
     is_settled: npt.NDArray[np.bool_]
-    n_runs: int
     residual_m_s2: FloatArray
     consistency: Consistency
     findings: tuple[Finding, ...] = ()

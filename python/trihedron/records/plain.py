@@ -1,7 +1,7 @@
 """Records as plain JSON types and back, by cattrs from the fields of the dataclasses.
 
-Added to cattrs here: arrays are nested lists, read-only mappings are dictionaries, and some documents name or order
-their entries differently from the record (``in`` for ``side``). The schemas are in ``files/schema/``.
+Added to cattrs here: arrays are nested lists, read-only mappings are dictionaries, and some documents name their
+entries differently from the record (``in`` for ``side``). The schemas are in ``files/schema/``.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ Record = TypeVar("Record")
 
 @dataclass(frozen=True)
 class Layout:
-    """How a document's entry differs from its record: ``names`` of fields, ``added`` entries, ``order`` of all entries.
+    """How a document's entry differs from its record: ``names`` of fields, ``added`` entries, fields ``left_out``.
 
     ``added`` is called with the record and its fields as plain types.
     """
 
     names: Mapping[str, str]
-    order: tuple[str, ...]
-    added: Callable[[Any, dict[str, Any]], dict[str, Any]] | None = None
+    added: Callable[[Any, dict[str, Any]], dict[str, Any]] = lambda _, made: made
+    left_out: tuple[str, ...] = ()
 
 
 class Plain:
@@ -87,9 +87,8 @@ def _converter() -> Converter:
 
         def written(record: Any) -> dict[str, Any]:
             made = of_fields(record)
-            if layout.added is not None:
-                made |= layout.added(record, made)
-            return {name: made[name] for name in layout.order}
+            made |= layout.added(record, made)
+            return {name: one for name, one in made.items() if name not in layout.left_out}
 
         return written
 

@@ -29,15 +29,6 @@ class OctaveNoise:
 
 
 @dataclass(frozen=True)
-class PoseLine:
-    """A line of ``amplitude`` [u] at ``frequency_hz`` common to the poses; ``excess``: power over the local level."""
-
-    frequency_hz: float
-    amplitude: Measured
-    excess: float
-
-
-@dataclass(frozen=True)
 class PoseNoise:
     """Noise of one axis inside the poses of a session; u is the unit of the raw readings.
 
@@ -46,20 +37,16 @@ class PoseNoise:
     their differences over √2, less the rounding error; 0 where that hides it), which is N √rate without a filter.
     ``step`` [u] is the resolution (LSB), 0 where it is too fine to show in the noise. ``corner_hz`` is the corner of a
     low-pass filter if one is detected, else ``corner_above_hz`` is its lower bound; ``corner_shape`` is the order of
-    the Butterworth filter that it resembles, 0 for a Gaussian. ``scatter`` is how far the noise differs from pose to
-    pose beyond chance (standard deviation of the logarithm of its power).
+    the Butterworth filter that it resembles, 0 for a Gaussian.
     """
 
     rate_hz: float
-    n_poses: int
     white: Measured | None
     reading_sigma: float
     step: float
     octaves: tuple[OctaveNoise, ...]
-    lines: tuple[PoseLine, ...]
     corner_hz: Measured | None
     corner_above_hz: float
-    scatter: float
     corner_shape: int = 0
 
 

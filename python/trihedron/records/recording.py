@@ -17,9 +17,8 @@ from trihedron.answers import ask
 from trihedron.arrays import AXES, CORE_MEMORY, FloatArray
 from trihedron.errors import InputError
 from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
-from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
+from trihedron.records.checked import Checked, numbers_of
 from trihedron.records.finding import Finding
-from trihedron.records.frozen import freeze
 from trihedron.records.onboard import Onboard
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
@@ -77,7 +76,7 @@ def spread_timestamps(time_s: FloatArray, step_s: float) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Presented):
+class Recording(Checked, Presented):
     """Raw readings on a common time base.
 
     Parameters
@@ -161,21 +160,11 @@ class Recording(Presented):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _readonly(value, name, (n,)))
-        if number_of("rate_hz", self.rate_hz) <= 0.0:
+        super().__post_init__()
+        if self.rate_hz <= 0.0:
             raise InputError(f"rate_hz must be a positive number, got {self.rate_hz}")
-        number_of("start_epoch_s", self.start_epoch_s)
-        if self.latitude_deg is not None and abs(number_of("latitude_deg", self.latitude_deg)) > 90.0:
+        if self.latitude_deg is not None and abs(self.latitude_deg) > 90.0:
             raise InputError(f"latitude_deg must be between -90 and 90, got {self.latitude_deg}")
-        units = (("accelerometer_unit", AccelerationUnit), ("gyroscope_unit", RateUnit))
-        for name, kind in units:
-            object.__setattr__(self, name, word_of(name, getattr(self, name), kind))
-        all_of("findings", self.findings, Finding)
-        kind_of("sampling", self.sampling, Sampling)
-        kind_of("auxiliary", self.auxiliary, dict, MappingProxyType)
-        kind_of("onboard", self.onboard, Onboard, type(None))
-        for name in ("source", "sha256"):
-            kind_of(name, getattr(self, name), str)
-        freeze(self)
 
     def with_distinct_timestamps(self) -> Recording:
         """This recording with strictly increasing timestamps (:func:`spread_timestamps`)."""

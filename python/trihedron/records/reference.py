@@ -75,11 +75,7 @@ class Estimate(Plain):
     unit: str
     score: float | None = None
     shown_from: float | None = None
-    LAYOUT: ClassVar[Layout] = Layout(
-        {},
-        ("names", "value", "std", "unit", "score", "shown_from"),
-        lambda estimate, _: {"std": estimate.std.tolist()},
-    )
+    LAYOUT: ClassVar[Layout] = Layout({}, lambda estimate, _: {"std": estimate.std.tolist()}, ("covariance",))
 
     @property
     def std(self) -> FloatArray:
@@ -106,9 +102,7 @@ class FitToReference(Plain):
     n_left_out: int
     widened: float
     LAYOUT: ClassVar[Layout] = Layout(
-        {"n_rows": "rows", "n_left_out": "left_out"},
-        ("S", "b", "sigma_S", "sigma_b", "rms", "rms_held_out", "band_hz", "rows", "left_out", "widened"),
-        lambda fit, _: fit.sigmas(),
+        {"n_rows": "rows", "n_left_out": "left_out"}, lambda fit, _: fit.sigmas(), ("covariance",)
     )
 
     def sigmas(self) -> dict[str, Any]:
@@ -228,12 +222,12 @@ class AgainstReference(Plain):
     apart: ErrorOverTime = NOWHERE
     LAYOUT: ClassVar[Layout] = Layout(
         {},
-        (
-            "source", "kind", "overlap_s", "correlation", "error", "clock", "mounting", "lever_arm", "vertical",
-            "gyroscope", "accelerometer", "bias", "earth_rate", "effects", "replay",
-        ),
         lambda found, _: {"clock": found.clock()},
-    )  # fmt: skip
+        (
+            *("clock_offset_s", "clock_middle_s", "clock_rate_ppm", "findings", "residual_time_s", "residual_rate"),
+            *("frame_covariance", "apart"),
+        ),
+    )
 
     def clock(self) -> dict[str, Any]:
         """Offset [s] and relative rate [ppm] of the reference's clock, with standard uncertainties."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.records.checked import all_of, kind_of, numbers_of
+from trihedron.records.checked import Checked
 from trihedron.records.finding import Finding
-from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
 
 LEAST_POSE_S = 1.0
@@ -74,7 +73,7 @@ class Move:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Segments(Presented):
+class Segments(Checked, Presented):
     """Poses and moves of one recording, and the sensor noise used to detect them. Arrays of a missing sensor are None.
 
     Attributes
@@ -128,16 +127,7 @@ class Segments(Presented):
     as_read: Segments | None = None
 
     def __post_init__(self) -> None:
-        all_of("poses", self.poses, Pose)
-        all_of("moves", self.moves, Move)
-        all_of("findings", self.findings, Finding)
-        kind_of("whole", self.whole, Segments, type(None))
-        kind_of("as_read", self.as_read, Segments, type(None))
-        for field in fields(self):
-            value = getattr(self, field.name)
-            is_array = field.name not in ("poses", "moves", "findings", "whole", "as_read")
-            if is_array and not (value is None and "None" in str(field.type)):
-                object.__setattr__(self, field.name, numbers_of(field.name, value))
+        super().__post_init__()
         n = len(self.poses)
         for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean",
                      "accelerometer_up"):  # fmt: skip
@@ -149,7 +139,6 @@ class Segments(Presented):
         for move in self.moves:
             if not (0 <= move.pose_before < n and 0 <= move.pose_after < n and move.start <= move.stop):
                 raise ValueError(f"move {move.index} does not join two poses")
-        freeze(self)
 
     @property
     def n_poses(self) -> int:

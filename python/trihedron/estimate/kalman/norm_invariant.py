@@ -75,14 +75,14 @@ def calibrate_without_references(
     # A run over all poses from the start: the result does not depend on the linearisation at the first poses.
     one = fresh()
     one.load(a - middle, start_s, pose_s, np.ascontiguousarray(extra))
-    n_runs = one.relinearise(MOST_RUNS)
+    is_converged = one.relinearise(MOST_RUNS) is not None
     parameters[-1], covariance = wrt @ one.parameters, wrt @ one.covariance @ wrt.T
     sigmas[-1] = sigmas_of(covariance)
     S, b = parameters[-1, :9].reshape(3, 3).copy(), parameters[-1, 9:].copy()
     innovation, innovation_sigma = one.innovations[:, 0].copy(), np.sqrt(one.innovations[:, 1])
     seen = check_innovations(innovation, innovation_sigma, N_PARAMETERS)
     findings: list[Finding] = []
-    if n_runs is None:
+    if not is_converged:
         findings.append(Finding.of("not-converged", "kalman", most_runs=MOST_RUNS))
     findings += consistency_findings(None, seen)
     accelerometer = SensorCalibration(
@@ -91,13 +91,11 @@ def calibrate_without_references(
     residual = np.linalg.norm(a @ S.T + b, axis=1) - gravity_m_s2
     return NormKalmanCalibration(
         accelerometer=accelerometer,
-        gravity_m_s2=gravity_m_s2,
         parameters=parameters,
         sigma=sigmas,
         innovation=innovation,
         innovation_sigma=innovation_sigma,
         is_settled=is_settled(innovation_sigma, N_PARAMETERS),
-        n_runs=n_runs or 0,
         residual_m_s2=residual,
         consistency=seen,
         findings=tuple(findings),

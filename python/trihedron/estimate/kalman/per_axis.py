@@ -176,7 +176,7 @@ def calibrate_with_references(
     findings += seen
     accelerometer = direct_form(axes, raw_unit, observability)
     residual = (z @ accelerometer.S.T + accelerometer.b) - f
-    return KalmanCalibration(tuple(axes), accelerometer, f, z, start_s, pose_s, residual, tuple(findings))
+    return KalmanCalibration(tuple(axes), accelerometer, f, start_s, residual, tuple(findings))
 
 
 def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:
@@ -198,7 +198,7 @@ def _one_axis(
     mean, sigma = np.zeros(4), np.full(4, DIFFUSE * model.fast_variance(float(np.min(pose))) ** 0.5)
     begin = _core.KalmanStart(mean, sigma, np.zeros(4))
     poses = _core.KalmanPoses(z, f, start, pose, extra)
-    constants, stated, covariance, innovation, variance, drift, drift_sigma = _core.kalman_track(model, begin, poses)
+    constants, stated, covariance, innovation, variance, drift, _ = _core.kalman_track(model, begin, poses)
     _, _, smoothed, smoothed_sigma = _core.kalman_smooth(model, begin, poses)
     # Ordinary least squares uses only the variance of one reading.
     white = model.fast_variance(float(np.median(pose))) + float(np.median(extra))
@@ -223,7 +223,6 @@ def _one_axis(
         innovation_sigma=innovation_sigma,
         is_settled=is_settled(innovation_sigma, len(mean)),
         drift=drift,
-        drift_sigma=drift_sigma,
         smoothed_drift=smoothed,
         smoothed_drift_sigma=smoothed_sigma,
         consistency=check_innovations(innovation, innovation_sigma, len(mean)),

@@ -88,8 +88,8 @@ def noise_of_poses(readings: FloatArray, rate_hz: float, poses: Sequence[tuple[i
     >>> import numpy as np
     >>> x = np.random.default_rng(1).normal(size=(5000, 1))
     >>> axis = noise_of_poses(x, 100.0, [(k, k + 400) for k in range(0, 5000, 500)])[0]
-    >>> axis.white.lower < 0.1 < axis.white.upper, axis.lines, axis.corner_hz
-    (True, (), None)
+    >>> axis.white.lower < 0.1 < axis.white.upper, axis.corner_hz
+    (True, None)
     """
     axes = [StaticAxis.of(column, rate_hz, poses, f"channel {c + 1}") for c, column in enumerate(readings.T)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
@@ -97,15 +97,12 @@ def noise_of_poses(readings: FloatArray, rate_hz: float, poses: Sequence[tuple[i
     return tuple(
         PoseNoise(
             rate_hz=rate_hz,
-            n_poses=len(axis.parts),
             white=density,
             reading_sigma=math.sqrt(max(axis.total - axis.rounding, 0.0)) if axis.is_dithered else 0.0,
             step=axis.step,
             octaves=_octaves(axis.parts, rate_hz),
-            lines=axis.lines,
             corner_hz=one.corner_hz,
             corner_above_hz=one.above_hz,
-            scatter=axis.pooled.scatter,
             corner_shape=one.shape,
         )
         for axis, one, density in zip(axes, filters, white, strict=True)
