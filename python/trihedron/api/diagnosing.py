@@ -9,20 +9,17 @@ from typing import TYPE_CHECKING
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
-from trihedron.api.diagnosing_static_log import Calibrated, is_static_log
+from trihedron.api.diagnosing_static_log import Calibrated, is_static_log, of_static_log
 from trihedron.api.reading import AnyRecording, accelerometer_only, recording_of, segments_of
 from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.session.starting_point import is_open, nominal, starts_nominal
-from trihedron.diagnose.static_log import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.gyroscope.common_scale import without_first_scale
 from trihedron.records import Calibration, Finding, Recording, Segments
-from trihedron.records.diagnosis import LinearModel
 from trihedron.records.progress import Progress
 from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
-from trihedron.segment.static_pieces import static_pieces
 
 if TYPE_CHECKING:
     from trihedron.api.diagnosing_with_simulation import GivenModel, Simulated
@@ -134,12 +131,9 @@ def _of_poses(
     if has_force and is_static_log(recording, segments, calibrated):
         notify(0.1, "looking at biases and spectral lines")
         used = nominal(recording, segments, (gravity, source)) if known is None else known
-        linear = LinearModel.of_sensors(used.accelerometer, used.gyroscope)
-        found = diagnose_static_log(recording, static_pieces(recording), linear, gravity, alpha)
-        lasts = float(recording.time_s[-1] - recording.time_s[0])
-        findings.append(Finding.of("not-fit", "few-orientations", duration_s=lasts, n_poses=segments.n_poses))
+        found, few = of_static_log(recording, segments, used, gravity, alpha)
         return DiagnosisResult(
-            **vars(found), findings=tuple(findings), gravity_source=source, model_is_given=known is not None,
+            **vars(found), findings=(*findings, few), gravity_source=source, model_is_given=known is not None,
             calibration=used, own_effects=found.effects, segments=segments, recording=recording,
         )  # fmt: skip
     simulated: Simulated | None = None

@@ -8,8 +8,11 @@ import numpy as np
 
 from trihedron.api.reading import FEWEST_POSES
 from trihedron.diagnose.session.starting_point import is_open
+from trihedron.diagnose.static_log import diagnose_static_log
 from trihedron.errors import INPUT_ERRORS
-from trihedron.records import Calibration, Recording, Segments
+from trihedron.records import Calibration, Finding, Recording, Segments
+from trihedron.records.diagnosis import Diagnosis, LinearModel
+from trihedron.segment.static_pieces import static_pieces
 from trihedron.transforms import directions_of
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -64,3 +67,13 @@ def _turns(recording: Recording, segments: Segments) -> int:
         for m in segments.moves
     ]
     return sum(angle > TURNED_RAD for angle in turned)
+
+
+def of_static_log(
+    recording: Recording, segments: Segments, model: Calibration, gravity: float, alpha: float
+) -> tuple[Diagnosis, Finding]:
+    """The diagnosis of a log of one or two orientations, which ``model`` converts to SI, and a finding that says so."""
+    linear = LinearModel.of_sensors(model.accelerometer, model.gyroscope)
+    lasts = float(recording.time_s[-1] - recording.time_s[0])
+    few = Finding.of("not-fit", "few-orientations", duration_s=lasts, n_poses=segments.n_poses)
+    return diagnose_static_log(recording, static_pieces(recording), linear, gravity, alpha), few
