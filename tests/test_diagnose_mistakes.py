@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from test_diagnose_against import fitted
-from trihedron.comparison.frames import carried_gravity, sign_of_gravity
+from trihedron.comparison.frames import carried_gravity, rates_of_world, sign_of_gravity
 from trihedron.comparison.noise import compare_noise, sampled
 from trihedron.comparison.slow import correlation_times
 from trihedron.diagnose.against.numbers import compare_numbers
@@ -77,13 +77,12 @@ def session_with_world_rates(seed):
 
 def test_rates_of_the_world_are_told_from_rates_of_the_body():
     body, world, segments = session_with_world_rates(3)
-    assert not carried_gravity(body, segments).is_of_world
+    assert rates_of_world(body, segments) is None
     other = trihedron.segment(world)
-    seen = carried_gravity(world, other)
-    assert seen.is_of_world
+    assert rates_of_world(world, other).term == "frame"
     # Ten moves by a part with scales and biases of a data sheet.
-    assert seen.world_rad < np.radians(5.0)
-    assert carried_gravity(replace(world, gyroscope_unit="counts"), other) is None
+    assert carried_gravity(world, other)[1] < np.radians(5.0)
+    assert rates_of_world(replace(world, gyroscope_unit="counts"), other) is None
 
 
 def test_gravity_of_the_other_sign_is_said_pose_by_pose_and_only_of_one_protocol():

@@ -11,7 +11,6 @@ from typing import Protocol
 
 import numpy as np
 
-from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.arrays import FloatArray, rms_of
 from trihedron.channel_facts.quiet import look
@@ -22,6 +21,7 @@ from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
 from trihedron.read.sensing import static_norm
 from trihedron.records import Calibration, Finding, Recording, SensorCalibration, Severity
+from trihedron.records.checked import WrongTypeError
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
 from trihedron.sensor_model import correct

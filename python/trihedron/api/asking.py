@@ -211,8 +211,6 @@ _PLAIN |= dict.fromkeys(("AllanKind", "By", "Form", "Frame", "Method", "NormFram
 _LISTED = {"float": " of numbers", "int": " of whole numbers", "str": " of texts", "tuple[float, float]": " of pairs"}
 
 
-__all__ = ["WrongTypeError", "asked_in_python"]
-
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 

@@ -114,8 +114,6 @@ def capture(
     --------
     >>> trihedron.capture("/dev/ttyUSB0", "log.csv", seconds=60)  # doctest: +SKIP
     """
-    if seconds is not None and not seconds > 0.0:
-        raise InputError(f"seconds is how long to record, not {seconds:g}")
     check_free([Path(output)], overwrite=overwrite)
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
     recorder = recorder_of(source, found, Path(output), overwrite=overwrite, rate_hz=rate_hz, wait_for_return_s=wait_s)
@@ -218,9 +216,7 @@ def _labels(columns: Columns, names: tuple[str, ...] | None, n: int, *, is_mappe
 
 def _by_content(cells: Cells) -> Columns:
     """Roles by content, for a stream joined after its header: a column that rises by one is the counter, another that
-    always rises is the time, the next six are the triads. Other columns keep their place without a role.
-
-    """
+    always rises is the time, the next six are the triads. Other columns keep their place without a role."""
     steps = np.diff(cells, axis=0)
     growing = [i for i in range(cells.shape[1]) if len(steps) and np.all(steps[:, i] > 0)]
     counter = next((i for i in growing if np.median(steps[:, i]) == 1.0), None)

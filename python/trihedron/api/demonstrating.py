@@ -63,11 +63,9 @@ def demo(
     --------
     >>> calibrated, contradicted = trihedron.demo("demo")  # doctest: +SKIP
     """
-    target = Path(folder)
-    if target.exists() and not overwrite:
-        raise InputError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
     from trihedron.api.disagreeing import disagree
 
+    target = Path(folder)
     return demonstrate(target, overwrite=overwrite)[0], disagree(target, seed, overwrite=overwrite)[0]
 
 
@@ -79,6 +77,8 @@ def demonstrate(
 
     The logs are written as CSV and read back like any log: only the final comparison uses the truth.
     """
+    if folder.exists() and not overwrite:
+        raise InputError(f"{folder}: this exists and was left alone; choose another name or add --force.")
     folder.mkdir(parents=True, exist_ok=True)
     log, stored, other = (folder / name for name in ("session.csv", "calibration.json", "second-session.csv"))
     say("simulating two sessions of one sensor")

@@ -172,17 +172,10 @@ def _of_poses(
         findings += more
         updated, used = used, given
     return DiagnosisResult(
-        **vars(found),
-        findings=tuple(findings),
-        gravity_source=source,
-        model_is_given=known is not None,
-        calibration=used,
-        updated=updated,
-        own_effects=own_effects,
+        **vars(found), findings=tuple(findings), gravity_source=source, model_is_given=known is not None,
+        calibration=used, updated=updated, own_effects=own_effects, segments=segments, recording=recording,
         simulated=None if simulated is None or simulated.scenario is None else simulated.recording,
-        segments=segments,
-        recording=recording,
-    )
+    )  # fmt: skip
 
 
 def _start(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 
-from trihedron.api.asking import WrongTypeError
 from trihedron.api.calibrating import calibrate
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import accelerometer_only, read, segment
@@ -21,6 +20,7 @@ from trihedron.diagnose.against.fitted import as_read, model_of_diagnosis
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Finding, Recording, Segments
+from trihedron.records.checked import WrongTypeError
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
 from trihedron.simulate import Scenario

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from trihedron.api.applying import AnyCalibration, calibration_of
 from trihedron.documents import read_text
-from trihedron.errors import InputError
 from trihedron.files.formats import ExportOptions, any_calibration, export_files
 from trihedron.files.noise import noise_figures, read_noise
 from trihedron.files.output import check_free, write_whole
@@ -68,14 +67,12 @@ def export(
     >>> "double S[3][3]" in header
     True
     """
-    if rate_hz is not None and not rate_hz > 0.0:
-        raise InputError(f"rate_hz is the number of samples per second, not {rate_hz}")
+    current = str(current_parameters or "")
+    # "none": the readings were logged raw.
+    if current not in ("", "none"):
+        current = read_text(current, "file of parameters")
     options = ExportOptions(
-        rate_hz=rate_hz,
-        topic=topic,
-        accel_lsb=accelerometer_lsb,
-        gyro_lsb=gyroscope_lsb,
-        current_parameters=parameters_text(current_parameters),
+        rate_hz=rate_hz, topic=topic, accel_lsb=accelerometer_lsb, gyro_lsb=gyroscope_lsb, current_parameters=current
     )
     if noise is not None:
         figures, rest_rate = noise_figures(noise_record(noise)) if isinstance(noise, Noise) else read_noise(noise)
@@ -100,10 +97,3 @@ def placed(made: dict[str, str], path: Path, *, write: bool = False, overwrite: 
         for name, text in targets.items():
             write_whole(name, text, overwrite=overwrite)
     return list(targets)
-
-
-def parameters_text(current: str | os.PathLike[str] | None) -> str:
-    """The text of a file of current parameters; ``none`` means that the readings were logged raw."""
-    if current is None or str(current) in ("", "none"):
-        return str(current or "")
-    return read_text(current, "file of parameters")

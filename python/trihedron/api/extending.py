@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.api.asking import WrongTypeError
 from trihedron.api.diagnosing import diagnose
 from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Finding, SensorCalibration, Severity
+from trihedron.records.checked import WrongTypeError
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import not_explained
 from trihedron.records.progress import Progress

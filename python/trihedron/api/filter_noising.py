@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from trihedron.api.asking import WrongTypeError
 from trihedron.api.choices import settle_gravity
 from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_log
 from trihedron.api.identifying import allan
@@ -25,6 +24,7 @@ from trihedron.estimate.filter_noise.static_intervals import (
 from trihedron.files.formats.contract import NoiseFigure
 from trihedron.files.noise import read_noise, read_noise_findings
 from trihedron.records import Finding, Noise, Recording, Segments, Severity
+from trihedron.records.checked import WrongTypeError
 from trihedron.records.filter_noise import (
     BiasModel,
     Bounded,
@@ -109,7 +109,9 @@ def filter_noise(
     of_own = () if own is None else tuple(f for f in own.findings if f.code in NOT_OF_THE_SENSOR)
     known, of_static, name = (_sensors(own), of_own, "") if static is None else _given(static)
     if reference is None and own is None:
-        raise InputError(_no_noise(recording, segments, has_static=static is not None))
+        raise InputError(_no_noise(recording, segments, "" if known else _in_counts(name), has_static=bool(name)))
+    if name and not known:
+        raise InputError(f"{name}: {_in_counts(name)}.")
     findings = (*recording.findings, *of_static, *(said if reference is not None else ()))
     tilt, intervals, source = None, None, ""
     if reference is not None:
@@ -140,7 +142,7 @@ def _check(recording: Recording, horizons: Sequence[float], band_hz: float | Non
         )
 
 
-def _no_noise(recording: Recording, segments: Segments | None, *, has_static: bool) -> str:
+def _no_noise(recording: Recording, segments: Segments | None, in_counts: str, *, has_static: bool) -> str:
     """All that is missing where a log shows no noise of its own."""
     missing = []
     if rate_to_si(recording.gyroscope_unit) is None:
@@ -151,6 +153,7 @@ def _no_noise(recording: Recording, segments: Segments | None, *, has_static: bo
     remedy = "; for static values run `trihedron allan` on a static log of ten minutes or more"
     if has_static:
         remedy = "; static values alone are those of `trihedron allan`"
+        remedy += f". Beside a reference, too, {in_counts}" if in_counts else ""
     return (
         f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
         f"beside it (--reference){remedy}."
@@ -212,17 +215,19 @@ def _given(static: Noise | str | os.PathLike[str]) -> tuple[Static, tuple[Findin
         raise WrongTypeError(
             f"static is what trihedron.allan found, or the name of a file, not {type(static).__name__}."
         )
-    if not known:
-        raise InputError(
-            f"{name}: the static log is in counts: give the JSON of `trihedron allan {name}` with --calibration FILE, "
-            "or with --gyro-lsb and --accel-lsb, the sizes of a count."
-        )
     doubts = []
     for one in said:
         if one.severity is Severity.SERIOUS or one.code in NOT_OF_THE_SENSOR:
             is_grave, seen = one.severity is Severity.SERIOUS, words("quoted", sentence=one.seen)
             doubts.append(Finding.of("filter-noise-static", "doubted" if is_grave else "noted", name=name, seen=seen))
     return known, tuple(doubts), name
+
+
+def _in_counts(name: str) -> str:
+    return (
+        f"the static log is in counts: give the JSON of `trihedron allan {name}` with --calibration FILE, or with "
+        "--gyro-lsb and --accel-lsb, the sizes of a count"
+    )
 
 
 def _bounded(figure: NoiseFigure) -> Bounded:

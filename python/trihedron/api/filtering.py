@@ -6,7 +6,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 
-from trihedron.api.asking import WrongTypeError
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.channel_facts.static_axes import SHORTEST as SHORTEST_POSE
@@ -29,6 +28,7 @@ from trihedron.records import (
     Segments,
     Severity,
 )
+from trihedron.records.checked import WrongTypeError
 from trihedron.records.noise import Noise, NoiseAxis
 from trihedron.records.progress import Progress
 from trihedron.records.results import KalmanResult

@@ -9,7 +9,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import read
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.against.fitted import FittedModel, FittedSensor, model_of_calibration
@@ -19,6 +18,7 @@ from trihedron.estimate.reference import fit_reference, turns_of_frame
 from trihedron.read import ReadError
 from trihedron.read.reference.motion import of_recording, read_reference
 from trihedron.records import Calibration, Finding, Frame, Recording, SensorCalibration
+from trihedron.records.checked import WrongTypeError
 from trihedron.records.diagnosis import (
     AcceptedEffect,
     Candidate,

@@ -6,9 +6,9 @@ import os
 from pathlib import Path
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units
-from trihedron.api.asking import WrongTypeError
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.records import Recording, Truth
+from trihedron.records.checked import WrongTypeError
 from trihedron.segment import segment_recording
 from trihedron.simulate import (
     Scenario,

@@ -8,7 +8,6 @@ import typer
 
 from trihedron.cli.options import with_options
 from trihedron.cli.output import leave, put, step, style
-from trihedron.errors import InputError
 
 FOLDER = "trihedron-demo"
 
@@ -22,9 +21,8 @@ OPTIONS = {
 @with_options(OPTIONS)
 def demo(folder: Path | None = None, seed: int | None = None, force: bool = False) -> None:
     """Two simulated examples: a calibration compared with the truth; a simulation that a log contradicts."""
-    target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
-    if folder is not None and folder.exists() and not force:
-        raise InputError(f"{folder}: this exists and was left alone; choose another name or add --force.")
+    free = (path for k in count(1) if not (path := Path(FOLDER if k == 1 else f"{FOLDER}-{k}")).exists())
+    target = next(free) if folder is None and not force else folder or Path(FOLDER)
     from trihedron.api.demonstrating import demonstrate
     from trihedron.report.text import to_text
 
@@ -36,9 +34,3 @@ def demo(folder: Path | None = None, seed: int | None = None, force: bool = Fals
     typer.echo("")
     put(to_text(disagree(target, drawn, overwrite=force, say=step)[1], style=style()))
     leave((*result.findings, *verified.findings))
-
-
-def _free_folder() -> Path:
-    """The first of ``trihedron-demo``, ``trihedron-demo-2`` ... that does not exist."""
-    names = (Path(FOLDER if k == 1 else f"{FOLDER}-{k}") for k in count(1))
-    return next(path for path in names if not path.exists())

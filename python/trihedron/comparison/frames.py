@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -106,10 +106,10 @@ OPPOSITE = -0.9
 
 def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference | None:
     """The finding that a simulated log's rates are in the world frame, or ``None``."""
-    seen = carried_gravity(recording, segments)
-    if seen is None or not seen.is_of_world:
+    body_rad, world_rad = carried_gravity(recording, segments) or (0.0, 0.0)
+    if body_rad <= MISSED_RAD or world_rad >= BETTER * body_rad:
         return None
-    remark = words("rates-of-world", body_rad=seen.body_rad, world_rad=seen.world_rad)
+    remark = words("rates-of-world", body_rad=body_rad, world_rad=world_rad)
     return difference("gyroscope", "frame", (None, None), "1", remark)
 
 
@@ -143,21 +143,8 @@ BETTER = 0.3
 """Error by world rates over that by body rates, below which the rates are the world's."""
 
 
-@dataclass(frozen=True)
-class CarriedGravity:
-    """Rms tilt error after the moves [rad], with rates in the body frame and in the world frame."""
-
-    body_rad: float
-    world_rad: float
-
-    @property
-    def is_of_world(self) -> bool:
-        """Whether the rates are in the world frame."""
-        return self.body_rad > MISSED_RAD and self.world_rad < BETTER * self.body_rad
-
-
-def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity | None:
-    """Gravity predicted after the moves from the rates, taken in the body frame and in the world frame.
+def carried_gravity(recording: Recording, segments: Segments) -> tuple[float, float] | None:
+    """Rms tilt error after the moves [rad], with rates taken in the body frame and in the world frame.
 
     Body: ``u₊ = ΔRᵀ u``. World: ``R₊ = ΔR R``, so ``u_n = R₀ᵀ (ΔR_n … ΔR_1)ᵀ e_z``, with R₀ from all poses (Wahba's
     problem). Rates are scaled by their unit, biases are those of the poses before and after each move; ``None``
@@ -184,4 +171,4 @@ def carried_gravity(recording: Recording, segments: Segments) -> CarriedGravity 
         to_body = to_body @ world_back
         carried.append(to_body[:, 2])
     _, missed = Rotation.align_vectors(up, np.array(carried))
-    return CarriedGravity(rms_of(misses), float(missed) / float(np.sqrt(len(up))))
+    return rms_of(misses), float(missed) / float(np.sqrt(len(up)))

@@ -93,8 +93,6 @@ def fleet(
         "gyroscope_unit": gyroscope_unit,
         "diagnose": diagnose,
     }
-    if workers is not None and workers < 0:
-        raise InputError(f"--workers is 0 or more, not {workers}.")
     notify = progress or (lambda _fraction, _text: None)
     notify(0.0, "looking at logs")
     jobs = find_jobs(logs, options, serial=serial, apart_from=folder)

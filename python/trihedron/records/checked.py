@@ -81,7 +81,7 @@ class Checked(Frozen):
     """Base of a frozen dataclass whose fields are checked against their types where it is made."""
 
     def __post_init__(self) -> None:
-        for name, kind in _kinds(type(self)):
+        for name, kind in _kinds(type(self)):  # type: ignore[arg-type]
             object.__setattr__(self, name, _settled(name, getattr(self, name), kind))
         freeze(self)
 
