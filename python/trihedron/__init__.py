@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from trihedron.api.filtering import kalman as kalman
     from trihedron.api.identifying import allan as allan
     from trihedron.api.planning import plan as plan
+    from trihedron.api.ranking import rank as rank
     from trihedron.api.reading import convert as convert
     from trihedron.api.reading import read as read
     from trihedron.api.reading import segment as segment
@@ -69,7 +70,6 @@ if TYPE_CHECKING:
     from trihedron.api.sessions import calibrate_sessions as calibrate_sessions
     from trihedron.api.simulating import simulate as simulate
     from trihedron.api.simulating import twin as twin
-    from trihedron.api.verifying import rank as rank
     from trihedron.api.verifying import verify as verify
     from trihedron.errors import InputError as InputError
     from trihedron.estimate.attitude import integrate_rate as integrate_rate
@@ -111,12 +111,13 @@ _PUBLIC = {
     "api.filtering": "kalman",
     "api.identifying": "allan",
     "api.planning": "plan",
+    "api.ranking": "rank",
     "api.reading": "convert read segment",
     "api.references": "calibrate_references",
     "api.replaying": "guide",
     "api.sessions": "calibrate_sessions",
     "api.simulating": "simulate twin",
-    "api.verifying": "rank verify",
+    "api.verifying": "verify",
     "errors": "InputError",
     "estimate.attitude": "integrate_rate",
     "estimate.noise.allan": "allan_deviation",
@@ -180,7 +181,7 @@ answered_by({"words_of": "trihedron.report.findings.catalogue", "phrase": "trihe
 answered_by(
     dict.fromkeys(("effect_words", "experiment", "why_not", "family_words"), "trihedron.report.effects.catalogue")
 )
-answered_by({"of_arrays": "trihedron.api.reading"})
+answered_by({"of_arrays": "trihedron.api.reading_arrays"})
 answered_by({"facts_of": "trihedron.channel_facts", "find_low_passes": "trihedron.channel_facts.static_axes"})
 answered_by({"find_possible_limits": "trihedron.channel_facts.possible_limits"})
 # Before any thread pool starts.

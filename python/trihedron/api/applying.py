@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Protocol
-
-import numpy as np
 
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.arrays import FloatArray, rms_of
@@ -25,7 +22,7 @@ from trihedron.records.checked import WrongTypeError
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
 from trihedron.sensor_model import correct
-from trihedron.thermal_model import parameters_at
+from trihedron.thermal_model import at_reference, check_range
 from trihedron.units import AccelerationUnit, RateUnit
 
 
@@ -160,7 +157,7 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
     """
     effects = calibration.extensions.get("effects")
     if not effects:
-        return _at_reference(calibration, recording), ()
+        return at_reference(calibration, recording), ()
     # Imported here: a linear calibration does not need it.
     from trihedron.diagnose import compensate
 
@@ -177,7 +174,7 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
     )
     findings = tuple(_not_applied(effect_id, why) for effect_id, why in done.left_out.items())
     linear = replace(recording, accelerometer=done.accelerometer, gyroscope=done.gyroscope)
-    return _at_reference(calibration, linear), findings
+    return at_reference(calibration, linear), findings
 
 
 def check_units(calibration: Calibration, recording: Recording) -> None:
@@ -213,87 +210,3 @@ def doubted(calibration: Calibration) -> tuple[Finding, ...]:
 def _not_applied(effect_id: str, why: str) -> Finding:
     is_of_session = why == words("effect-of-session")
     return Finding.of("effect-not-applied", "of-session" if is_of_session else "", effect=effect_id, why=why)
-
-
-# Temperature when a calibration is applied: polynomials are evaluated inside their range, and clamped at its limits.
-
-KNOTS = 257
-"""Number of temperatures of the range at which S and b are exact, linear between: the error for a cubic over the range
-is 1e-5 of its total change."""
-TOLERANCE_DEGC = 1.0
-"""Excess over the range that the thermometer's resolution explains."""
-ROWS = 1 << 17
-
-
-def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding, ...]:
-    """A serious finding where a log was recorded outside the temperatures that a calibration was made for.
-
-    Raises ``InputError`` when the calibration's range is not two numbers.
-    """
-    stated = calibration.extensions.get("valid_range")
-    if not isinstance(stated, Mapping) or "temperature_degc" not in stated:
-        return ()
-    try:
-        low, high = (float(value) for value in stated["temperature_degc"])
-    except (TypeError, ValueError):
-        raise InputError("the calibration's valid_range is not two temperatures: calibrate again.") from None
-    T = recording.temperature_degc
-    if T is None or not np.isfinite(T).any():
-        missing = Finding.of("temperature-missing", low_degc=low, high_degc=high)
-        return (missing,) if "thermal" in calibration.extensions else ()
-    known = T[np.isfinite(T)]
-    outside = int(np.sum((known < low - TOLERANCE_DEGC) | (known > high + TOLERANCE_DEGC)))
-    if outside == 0:
-        return ()
-    return (
-        Finding.of(
-            "outside-valid-range",
-            ends_are_held="thermal" in calibration.extensions,
-            n_outside=outside,
-            n_samples=len(known),
-            low_degc=low,
-            high_degc=high,
-            log_low_degc=known.min(),
-            log_high_degc=known.max(),
-        ),
-    )
-
-
-def _at_reference(calibration: Calibration, recording: Recording) -> Recording:
-    """The raw readings at the reference temperature that S(T), b(T) of every sample make of them; the recording itself
-    where the calibration has no temperature model or the log no temperature.
-
-    Outside the range S and b keep their values at its limits. Missing temperatures are interpolated.
-    """
-    T = recording.temperature_degc
-    if not isinstance(calibration.extensions.get("thermal"), Mapping) or T is None or not np.isfinite(T).any():
-        return recording
-    low, high = (float(v) for v in calibration.extensions["valid_range"]["temperature_degc"])  # type: ignore[index]
-    known = np.isfinite(T)
-    whole = T if known.all() else np.interp(np.arange(len(T)), np.flatnonzero(known), T[known])
-    knots = np.linspace(low, max(high, low + 1e-9), KNOTS)
-    table = np.array([parameters_at(calibration, float(t)) for t in knots])
-    place = (np.clip(whole, low, high) - low) / (knots[1] - knots[0])
-    return replace(
-        recording,
-        accelerometer=_followed(recording.accelerometer, calibration.accelerometer, table[:, :12], place),
-        gyroscope=_followed(recording.gyroscope, calibration.gyroscope, table[:, 12:], place),
-    )
-
-
-def _followed(
-    readings: FloatArray | None, sensor: SensorCalibration | None, table: FloatArray, place: FloatArray
-) -> FloatArray | None:
-    if readings is None or sensor is None:
-        return readings
-    of_reading = np.linalg.solve(sensor.S, table[:, :9].reshape(-1, 3, 3))
-    constant = np.linalg.solve(sensor.S, (table[:, 9:] - sensor.b).T).T
-    table = np.hstack([of_reading.reshape(-1, 9), constant])
-    out = np.empty_like(readings)
-    for start in range(0, len(readings), ROWS):
-        rows = slice(start, start + ROWS)
-        below = np.minimum(np.floor(place[rows]).astype(np.int64), len(table) - 2)
-        share = (place[rows] - below)[:, None]
-        parameters = (1.0 - share) * table[below] + share * table[below + 1]
-        out[rows] = np.einsum("nij,nj->ni", parameters[:, :9].reshape(-1, 3, 3), readings[rows]) + parameters[:, 9:]
-    return out

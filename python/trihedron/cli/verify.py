@@ -44,7 +44,7 @@ def verify(
     best is rejected.
     """
     results.check(inputs=source.files)
-    from trihedron.api import verifying
+    from trihedron.api import ranking, verifying
     from trihedron.report.machine import verification_record
     from trihedron.report.ranking import ranking_record, ranking_report
 
@@ -54,13 +54,13 @@ def verify(
     recording = log.read()
     if len(known) > 1:
         with progress("ranking") as notify:
-            ranking = verifying.rank(paths, recording, progress=notify, **place.said)
-        document = ranking_report(ranking)
-        note_file(next(path for path in paths if path.name == ranking.best.name))
+            found = ranking.rank(paths, recording, progress=notify, **place.said)
+        document = ranking_report(found)
+        note_file(next(path for path in paths if path.name == found.best.name))
         results.show(document, FIRST_SCREEN)
-        results.write(document, lambda: ranking_record(ranking))
-        leave(ranking.best.verification.findings, is_shown=not is_stdout(results.json))
-        if ranking.best.is_rejected:
+        results.write(document, lambda: ranking_record(found))
+        leave(found.best.verification.findings, is_shown=not is_stdout(results.json))
+        if found.best.is_rejected:
             raise typer.Exit(NOT_TO_BE_TRUSTED)
         return
     from trihedron.report.verification import verification_report
