@@ -248,9 +248,8 @@ def test_a_refusal_is_told_from_a_defect():
 
 # Calls that a handler of ValueError may stand round; api/asking.py says what it catches in Python's words.
 CONVERSIONS = {
-    "api/applying.py: float",
-    "api/capturing.py: float",
-    "api/reading.py: np.ma.asanyarray",
+    "api/naming_columns.py: float",
+    "api/reading_arrays.py: np.ma.asanyarray",
     "api/streaming.py: note.read_text",
     "api/streaming.py: json.loads",
     "api/asking.py: result_in_python",

@@ -10,31 +10,19 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.api.calibrating import calibrate
-from trihedron.api.planning_poses import (
-    Known,
-    best_next,
-    move_rows,
-    path_of,
-    poses_needed,
-    shortest_path,
-    sigma_of,
-)
+from trihedron.api.planning_poses import best_next, is_determined, planned, poses_needed, sigma_of
 from trihedron.api.reading import segment
 from trihedron.api.verifying import own_calibration, verify
 from trihedron.arrays import XYZ, FloatArray, sigmas_of
 from trihedron.errors import INPUT_ERRORS
-from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
+from trihedron.estimate.accelerometer.poses import ENTRIES, parameter_names, pose_in_words
 from trihedron.records import Calibration, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
 from trihedron.records.results import CalibrationResult, VerificationResult
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
     acceleration_to_si,
-    rate_to_si,
 )
-
-PRIOR = 0.1
-"""Prior of a board before its first pose: scales within 10 %, axes within 0.1 rad, biases within 0.1 g."""
 
 SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
 USUAL_POSE_S = 4.0
@@ -54,7 +42,7 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
     calibration = None if segments.n_poses < 6 else own_calibration(recording, segments, gravity_m_s2)
     centre, matrix = _rough_model(recording, segments, calibration)
     up = _unit((_means(segments) - centre) @ matrix.T)
-    known = _known(recording, segments, calibration, up, (centre, matrix, gravity_m_s2))
+    known = planned(recording, segments, calibration, up, (centre, matrix, gravity_m_s2))
     now_a, now_g = _now(calibration, gravity_m_s2)
     # The ratio of the fit's uncertainty to the planned one (correlated poses, noise too small) is assumed to persist.
     ratio_a = _ratio(now_a, known.accelerometer)
@@ -79,7 +67,7 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
         next_words=pose_in_words(best),
         why=_why(uncertain, LEAST_POSES - len(up) if shortfall <= 1.0 else 0),
         poses_needed=needed,
-        pose_s=_pose_s(known, accuracy, segments),
+        pose_s=_pose_s(known.pose_sigma, accuracy, segments),
         warnings=(*_doubts(calibration), *_warnings(recording, segments))[:4],
         rate_hz=recording.rate_hz,
         doubts=_doubts(calibration),
@@ -135,18 +123,11 @@ def _means(segments: Segments) -> FloatArray:
     return np.zeros((0, 3)) if segments.accelerometer_mean is None else segments.accelerometer_mean
 
 
-def _is_determined(calibration: Calibration | None) -> bool:
-    if calibration is None:
-        return False
-    observability = calibration.accelerometer.observability
-    return observability is not None and observability.rank >= 9
-
-
 def _rough_model(
     recording: Recording, segments: Segments, calibration: Calibration | None
 ) -> tuple[FloatArray, FloatArray]:
     """(centre (3,), matrix (3, 3)): matrix · (raw reading − centre) is a vector along up in the body."""
-    if calibration is not None and _is_determined(calibration):
+    if calibration is not None and is_determined(calibration):
         S = calibration.accelerometer.S
         centre: FloatArray = np.asarray(-np.linalg.solve(S, calibration.accelerometer.b), dtype=np.float64)
         return centre, S
@@ -169,49 +150,10 @@ def _unit(vectors: FloatArray) -> FloatArray:
     return vectors / np.where(length > 0.0, length, 1.0)
 
 
-def _known(
-    recording: Recording,
-    segments: Segments,
-    calibration: Calibration | None,
-    up: FloatArray,
-    model: tuple[FloatArray, FloatArray, float],
-) -> Known:
-    """Planned covariances from the orientations of the poses, the paths of the moves and the noise; no fit needed."""
-    centre, matrix, gravity = model
-    relative = np.full(len(up), 1e-3)
-    if segments.norm_sigma is not None and len(up):
-        length = np.linalg.norm((_means(segments) - centre) @ matrix.T, axis=1)
-        size = gravity if _is_determined(calibration) else float(np.median(length)) or 1.0
-        relative = np.sqrt(np.mean((segments.norm_sigma @ np.abs(matrix).T) ** 2, axis=1)) / size
-    relative = np.maximum(relative, 1e-6)
-    rows = design_rows(up) / relative[:, None] if len(up) else np.zeros((0, 9))
-    accelerometer = np.linalg.inv(rows.T @ rows + np.eye(9) / PRIOR**2)
-    pose = float(np.median(relative)) if len(relative) else 1e-3
-    if recording.gyroscope is None:
-        return Known(up, accelerometer, None, pose, pose)
-    scale = rate_to_si(recording.gyroscope_unit)
-    S = None if scale is None else scale * np.eye(3)
-    if calibration is not None and calibration.gyroscope is not None:
-        S = calibration.gyroscope.S
-    noise = 0.0
-    if S is not None and segments.gyroscope_sigma is not None:
-        step = 1.0 / recording.rate_hz
-        noise = float(np.nanmean(np.abs(np.diag(S)) * segments.gyroscope_sigma)) * step * np.sqrt(2.0 / step)
-    sigma = float(np.hypot(np.sqrt(2.0) * pose, 0.0 if not np.isfinite(noise) else noise))
-    information = np.eye(9) / PRIOR**2
-    for move in segments.moves:
-        path = path_of(recording, segments, S, move.pose_before, move.pose_after, move.start, move.stop)
-        path = shortest_path(up[move.pose_before], up[move.pose_after]) if path is None else path
-        design = move_rows(path, up[move.pose_after]) / sigma
-        information += design.T @ design
-    gyroscope: FloatArray = np.asarray(np.linalg.inv(information), dtype=np.float64)
-    return Known(up, accelerometer, gyroscope, pose, sigma)
-
-
 def _now(calibration: Calibration | None, gravity: float) -> tuple[FloatArray, FloatArray]:
     """Relative standard errors by the fit: accelerometer (9,), gyro (9,); NaN where it determines none."""
     nan = np.full(9, np.nan)
-    if calibration is None or not _is_determined(calibration):
+    if calibration is None or not is_determined(calibration):
         return nan, nan
     sensor = calibration.accelerometer
     sigma = sigmas_of(sensor.covariance)
@@ -257,10 +199,10 @@ def _why(uncertain: tuple[Uncertain, ...], n_testing: int) -> str:
     return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
 
 
-def _pose_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
+def _pose_s(pose_sigma: float, accuracy: Accuracy, segments: Segments) -> float:
     """Duration of a pose [s] for which its error is ``POSES_PER_GOAL`` times the target; noise falls as 1/√time."""
     held = float(np.median(segments.duration_s)) if segments.n_poses else USUAL_POSE_S
-    excess = known.pose_sigma / (POSES_PER_GOAL * accuracy.accelerometer)
+    excess = pose_sigma / (POSES_PER_GOAL * accuracy.accelerometer)
     return float(np.clip(held * excess**2, SHORTEST_POSE_S, LONGEST_POSE_S))
 
 

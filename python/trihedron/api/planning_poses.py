@@ -8,8 +8,9 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import CANDIDATES, design_rows
-from trihedron.records import Recording, Segments
+from trihedron.records import Calibration, Move, Recording, Segments
 from trihedron.transforms import rotation_by
+from trihedron.units import rate_to_si
 
 NEAR = 0.9
 """Cosine to the previous pose above which a pose is not a candidate: the move would be too small."""
@@ -18,6 +19,9 @@ CORNER_PENALTY = 1.15
 """Factor on the cost of a pose on a corner, which is harder to hold still than one on a face or an edge."""
 
 LONGEST_LOOK = 24
+
+PRIOR = 0.1
+"""Prior of a board before its first pose: scales within 10 %, axes within 0.1 rad, biases within 0.1 g."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +35,13 @@ class Known:
     move_sigma: float
 
 
-def path_of(
-    recording: Recording, segments: Segments, S: FloatArray | None, before: int, after: int, start: int, stop: int
-) -> FloatArray | None:
+def path_of(recording: Recording, segments: Segments, S: FloatArray | None, move: Move) -> FloatArray | None:
     """(k, 3) small rotation vectors of a move from the gyro, in the body, or None without a scale."""
     assert recording.gyroscope is not None
+    start, stop = move.start, move.stop
     if S is None or stop - start < 4 or segments.gyroscope_mean is None:
         return None
-    bias = 0.5 * (segments.gyroscope_mean[before] + segments.gyroscope_mean[after])
+    bias = 0.5 * (segments.gyroscope_mean[move.pose_before] + segments.gyroscope_mean[move.pose_after])
     rate = (recording.gyroscope[start:stop] - bias) @ S.T
     steps = np.diff(recording.time_s[start : stop + 1], append=recording.time_s[stop - 1])[: len(rate), None]
     pieces = np.array_split(np.nan_to_num(rate * steps), min(len(rate), 60))
@@ -119,3 +122,51 @@ def poses_needed(known: Known, wanted: FloatArray, factor: FloatArray, shortfall
         if float(np.nanmax(sigma_of(known) * factor / wanted)) <= 1.0:
             return count
     return None
+
+
+def is_determined(calibration: Calibration | None) -> bool:
+    """Whether the poses determine all nine parameters of the accelerometer."""
+    if calibration is None:
+        return False
+    observability = calibration.accelerometer.observability
+    return observability is not None and observability.rank >= 9
+
+
+def planned(
+    recording: Recording,
+    segments: Segments,
+    calibration: Calibration | None,
+    up: FloatArray,
+    model: tuple[FloatArray, FloatArray, float],
+) -> Known:
+    """Planned covariances from the orientations of the poses, the paths of the moves and the noise; no fit needed."""
+    centre, matrix, gravity = model
+    relative = np.full(len(up), 1e-3)
+    means = segments.accelerometer_mean
+    if means is not None and segments.norm_sigma is not None and len(up):
+        length = np.linalg.norm((means - centre) @ matrix.T, axis=1)
+        size = gravity if is_determined(calibration) else float(np.median(length)) or 1.0
+        relative = np.sqrt(np.mean((segments.norm_sigma @ np.abs(matrix).T) ** 2, axis=1)) / size
+    relative = np.maximum(relative, 1e-6)
+    rows = design_rows(up) / relative[:, None] if len(up) else np.zeros((0, 9))
+    accelerometer = np.linalg.inv(rows.T @ rows + np.eye(9) / PRIOR**2)
+    pose = float(np.median(relative)) if len(relative) else 1e-3
+    if recording.gyroscope is None:
+        return Known(up, accelerometer, None, pose, pose)
+    scale = rate_to_si(recording.gyroscope_unit)
+    S = None if scale is None else scale * np.eye(3)
+    if calibration is not None and calibration.gyroscope is not None:
+        S = calibration.gyroscope.S
+    noise = 0.0
+    if S is not None and segments.gyroscope_sigma is not None:
+        step = 1.0 / recording.rate_hz
+        noise = float(np.nanmean(np.abs(np.diag(S)) * segments.gyroscope_sigma)) * step * np.sqrt(2.0 / step)
+    sigma = float(np.hypot(np.sqrt(2.0) * pose, 0.0 if not np.isfinite(noise) else noise))
+    information = np.eye(9) / PRIOR**2
+    for move in segments.moves:
+        path = path_of(recording, segments, S, move)
+        path = shortest_path(up[move.pose_before], up[move.pose_after]) if path is None else path
+        design = move_rows(path, up[move.pose_after]) / sigma
+        information += design.T @ design
+    gyroscope: FloatArray = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    return Known(up, accelerometer, gyroscope, pose, sigma)

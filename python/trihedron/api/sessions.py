@@ -9,22 +9,19 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Literal, get_args
 
-import numpy as np
-
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import amount_of, combine
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.sessions.changes import bias_drift, changes_among, of_another_unit
-from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
-from trihedron.records import Finding, Frame, Recording, SensorCalibration, Severity
+from trihedron.estimate.sessions.changes import changes_among, of_another_unit
+from trihedron.estimate.sessions.numbers import sessions_of
+from trihedron.records import Finding, Frame, Recording, Severity
 from trihedron.records.progress import Progress
-from trihedron.records.recording import as_arguments, distinct_names
+from trihedron.records.recording import as_arguments
 from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Change, Session
 from trihedron.records.words import Words, words
-from trihedron.sensor_model import in_frame
 
 BYS: tuple[By, ...] = get_args(By)
 LEFT_BY_S_AND_B = (
@@ -33,9 +30,6 @@ LEFT_BY_S_AND_B = (
     "gyro-g-sensitivity",
     "gyro-bias-drift",
 )
-HEATING_DEGC = 1.0
-"""Change of temperature over a recording from which it counts as heating or cooling: built-in thermometers have a
-resolution of 0.1 to 0.5 °C."""
 
 
 def calibrate_sessions(
@@ -212,59 +206,3 @@ def _label(recording: Recording, by: By) -> str:
         _name, comma, device = recording.source.rpartition(", ")
         return device if comma and device.startswith("device ") else Path(recording.source).parent.name
     return recording.source
-
-
-def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> tuple[Session, ...]:
-    """Calibrations as frame-independent parameters, relative to the axes of the first one."""
-    first = in_frame(results[0].calibration, "lower")
-    anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
-    names = distinct_names([result.recording.source for result in results])
-    return tuple(
-        session_of(result, anchor, name, group) for result, name, group in zip(results, names, groups, strict=True)
-    )
-
-
-def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str) -> Session:
-    """One calibration as parameters with their covariance."""
-    calibration = in_frame(result.calibration, "lower")
-    accel, gyro = calibration.accelerometer, calibration.gyroscope
-    S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
-    jacobian = numbers_jacobian(accel.S, accel.b, S_g, b_g)
-    covariance = jacobian @ calibration.covariance @ jacobian.T
-    recording = result.recording
-    temperature, low, high, branch = _temperature(result)
-    return Session(
-        name,
-        group,
-        numbers_of(accel.S, accel.b, S_g, b_g, anchor),
-        0.5 * (covariance + covariance.T),
-        bias_drift(calibration, result.segments, len(covariance)),
-        recording.start_epoch_s,
-        temperature,
-        (low, high),
-        branch,
-        recording.sha256,
-        *_gravity_error(accel),
-    )
-
-
-def _gravity_error(sensor: SensorCalibration) -> tuple[float, float]:
-    """Cross-validated rms in the poses [m/s²], and over noise alone."""
-    quality = sensor.quality
-    if quality is None or quality.held_out_rms is None or not quality.floor > 0.0:
-        return math.nan, math.nan
-    return quality.held_out_rms, quality.held_out_rms / quality.floor
-
-
-def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
-    """Mean, least and largest temperature of the poses, and +1 for heating, -1 for cooling, else 0."""
-    T = result.recording.temperature_degc
-    if T is None:
-        return math.nan, math.nan, math.nan, 0
-    means = [
-        float(np.nanmean(T[h.start : h.stop])) for h in result.segments.poses if np.isfinite(T[h.start : h.stop]).any()
-    ]
-    if not means:
-        return math.nan, math.nan, math.nan, 0
-    rise = means[-1] - means[0]
-    return float(np.mean(means)), min(means), max(means), 0 if abs(rise) < HEATING_DEGC else int(np.sign(rise))

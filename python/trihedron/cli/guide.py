@@ -126,8 +126,8 @@ def run_guided(
     seconds: float | None,
 ) -> Any:
     """Capture with the guide; returns the guide, which has the start of the verification."""
-    from trihedron.api.capturing import sensor_columns
     from trihedron.api.guiding import examine
+    from trihedron.api.naming_columns import sensor_columns
     from trihedron.api.reading import read
     from trihedron.capture.guide import Guide
     from trihedron.records.guiding import Accuracy

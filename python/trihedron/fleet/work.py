@@ -83,7 +83,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
 
 
 def _row(result: Any) -> Row:
-    from trihedron.api.sessions import session_of
+    from trihedron.estimate.sessions.numbers import session_of
     from trihedron.files.calibration import calibration_document
     from trihedron.invariants import anchor_of
     from trihedron.sensor_model import in_frame
