@@ -3,49 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from trihedron.api.calibrating_methods import METHODS, Found, LogOfPoses, Method, on_turns
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, require_poses, segments_of
-from trihedron.errors import INPUT_ERRORS, InputError
-from trihedron.estimate.accelerometer.face_poses import faces_up, shared_rounding
-from trihedron.estimate.accelerometer.faces import calibrate_faces
+from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.nonlinear_shapes import with_shapes
-from trihedron.estimate.accelerometer.norm import calibrate_norm
-from trihedron.estimate.case_session import in_case_frame
 from trihedron.estimate.gyroscope.common_scale import scale_findings, without_first_scale
 from trihedron.estimate.gyroscope.lost_samples import missing_samples, relative_sigma
-from trihedron.estimate.gyroscope.stated_turns import (
-    TableTurns,
-    by_quarters,
-    on_stated_turns,
-    scale_of_stated,
-    table_turns,
-)
 from trihedron.estimate.gyroscope.turntable import on_turntable
-from trihedron.estimate.session.solved import calibrate_joint, calibrate_moves
-from trihedron.estimate.session.start import GyroClippedError
 from trihedron.estimate.verification import reference_findings
 from trihedron.estimate.verified_static_rate import with_static_rate
-from trihedron.records import Calibration, Finding, Frame, Recording, Segments, SensorCalibration, Severity
+from trihedron.records import Calibration, Frame, Recording, Segments, Severity
 from trihedron.records.plain import as_plain
 from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
-from trihedron.records.words import words
 from trihedron.sensor_model import in_frame
 
 if TYPE_CHECKING:
     from trihedron.api.referring import AnyReference
-
-Method = Literal["joint", "separate", "faces"]
-METHODS: tuple[Method, ...] = get_args(Method)
-
-Found = tuple[Finding, ...]
 
 
 def calibrate(
@@ -134,7 +113,7 @@ def calibrate(
         said = (*said, *reference_findings(by_motion, recording, segments)) if is_fitted else ()
         return replace(_result(by_motion, (*said, *by_motion.findings), segments, recording), reference=found)
     require_poses(recording, segments)
-    log = _Log(recording, segments, gravity, source, gyroscope_nominal)
+    log = LogOfPoses(recording, segments, gravity, source, gyroscope_nominal)
     if method == "faces":
         calibration = log.by_faces(faces, turns_deg)
         wanted: Frame = frame or "case"
@@ -150,7 +129,7 @@ def calibrate(
             raise InputError(" ".join((*grave, *(["As it is:"] if grave else []), str(error)))) from None
     calibration = in_frame(calibration, wanted)
     if turns_deg is not None and method != "faces" and calibration.gyroscope is not None:
-        calibration = _on_turns(calibration, recording, segments, turns_deg)[0]
+        calibration = on_turns(calibration, recording, segments, turns_deg)[0]
     if turntable_deg_s is not None or turntable_sigma != 0.0:
         calibration = on_turntable(calibration, recording, segments, turntable_deg_s, turntable_sigma)
     of_fit = _of_fit(calibration, recording, segments)
@@ -196,101 +175,3 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     # Losses detected in the motion are not also possible ones of the fit.
     fitted = tuple(one for one in fitted if not (missing and one.code == "losses-possible"))
     return (*fitted, *of_gyro, *missing)
-
-
-@dataclass(frozen=True, eq=False)
-class _Log:
-    """What every method starts from; ``nominal`` is the gyro's scale [rad/s per unit]."""
-
-    recording: Recording
-    segments: Segments
-    gravity: float
-    source: str
-    nominal: float | None
-
-    def by_poses(self, method: Method, axis_signs: Sequence[int] | None) -> Calibration:
-        recording, segments, gravity = self.recording, self.segments, self.gravity
-        assert segments.accelerometer_mean is not None
-        assert segments.norm_sigma is not None
-        accelerometer, found = calibrate_norm(
-            segments.accelerometer_mean,
-            segments.norm_sigma,
-            gravity,
-            raw_unit=recording.accelerometer_unit,
-            axis_signs=axis_signs,
-        )
-        alone = self._alone(accelerometer, found, "lower")
-        if recording.gyroscope is None:
-            return alone
-        try:
-            # Moves do not refine an accelerometer with a serious finding: its error adds to the gyro's uncertainties.
-            if method == "joint" and alone.is_trustworthy:
-                return calibrate_joint(recording, segments, alone, self.nominal)
-            gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, self.nominal)
-        except INPUT_ERRORS as error:
-            return _without_gyroscope(alone, error)
-        # Fitted separately: the gyro's covariance includes the accelerometer's error.
-        covariance = np.zeros((24, 24))
-        covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
-        return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*found, *more))
-
-    def by_faces(self, faces: Sequence[int] | None, turns_deg: Sequence[float] | None) -> Calibration:
-        recording, segments = self.recording, self.segments
-        mean, sigma_mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean, segments.norm_sigma
-        unit = recording.accelerometer_unit
-        assert mean is not None
-        assert sigma_mean is not None
-        up = faces_up(mean, unit, faces)
-        shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
-        by_faces = partial(calibrate_faces, mean, sigma_mean, self.gravity, up=faces, raw_unit=unit, shared=shared)
-        try:
-            accelerometer, found = by_faces()
-        except INPUT_ERRORS:
-            if recording.gyroscope is None or turns_deg is None or sigma is None:
-                raise
-            # Stated turns about stated faces determine the gyro even without a full accelerometer.
-            accelerometer, _ = by_faces(is_square=True)
-            _, found = calibrate_norm(mean, sigma, self.gravity, raw_unit=unit)
-        alone = self._alone(accelerometer, found, "case")
-        if recording.gyroscope is None:
-            return alone
-        # The lean of the table is found anew beside moves.
-        found = tuple(one for one in found if one.code != "table-tilt")
-        try:
-            stated = None
-            if turns_deg is not None:
-                stated = scale_of_stated(table_turns(recording, segments, accelerometer, turns_deg))
-            # Residuals of faces are leans of the table, which poses and moves do not have.
-            near = replace(alone, accelerometer=replace(accelerometer, quality=None), findings=found)
-            session = replace(calibrate_joint(recording, segments, near, self.nominal, stated), frame="lower")
-            return in_case_frame(*_on_turns(session, recording, segments, turns_deg), recording, segments, up)
-        except INPUT_ERRORS as error:
-            if turns_deg is not None:
-                raise
-            return _without_gyroscope(alone, error)
-
-    def _alone(self, accelerometer: SensorCalibration, found: Found, frame: Frame) -> Calibration:
-        of_log = (self.gravity, self.source, self.recording.source, self.recording.sha256)
-        return Calibration(accelerometer, None, accelerometer.covariance, frame, *of_log, findings=found)
-
-
-def _on_turns(
-    session: Calibration, recording: Recording, segments: Segments, turns_deg: Sequence[float] | None
-) -> tuple[Calibration, TableTurns]:
-    """The calibration of poses and moves updated with turns on a table, and these; multiples of 90° where the user
-    states no angles."""
-    assert session.gyroscope is not None
-    turns = table_turns(recording, segments, session.accelerometer, turns_deg)
-    if turns_deg is None:
-        turns, said = by_quarters(turns, session)
-        session = replace(session, findings=(*session.findings, *said))
-    return on_stated_turns(session, recording, segments, turns) if turns.moves else (session, turns)
-
-
-def _without_gyroscope(alone: Calibration, error: Exception) -> Calibration:
-    if isinstance(error, GyroClippedError):
-        finding = Finding.of("gyroscope-left-out", "clipped", n_lost=error.n_lost, n_moves=error.n_moves)
-    else:
-        why = words("because", sentence=str(error))
-        finding = Finding.of("gyroscope-left-out", "not-calibrated", why=why)
-    return replace(alone, findings=(*alone.findings, finding))

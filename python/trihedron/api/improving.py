@@ -94,34 +94,30 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
 
 def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
     """Ratio of rms pose and move errors, scenario over recording, where outside ``AIMED_AT``."""
-    made = dict(zip(("poses", "moves"), beside.missed(better), strict=True))
-    seen = {"poses": beside.poses, "moves": beside.moves}
-    ratios = {k: math.sqrt(m / s) for k, m in made.items() if m is not None and (s := seen[k]) is not None and s > 0.0}
+    both = zip(("poses", "moves"), beside.missed(better), (beside.poses, beside.moves), strict=True)
+    ratios = {key: math.sqrt(made / seen) for key, made, seen in both if made is not None and seen}
     return {key: ratio for key, ratio in ratios.items() if not AIMED_AT[0] <= ratio <= AIMED_AT[1]}
 
 
-def _of_poses(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
+def _of_poses(seen: Sampled) -> dict[str, tuple[NoiseTerms, Smoother]]:
     """Noise terms and low-pass of each sensor, fitted to the octaves of the noise inside the recording's poses."""
-    recording = found.recording
-    seen = sampled(recording, found.segments.poses, model_of_diagnosis(found)).noise
     out = {}
-    for name, axes in seen.items():
+    for name, axes in seen.noise.items():
         # Octaves common to all axes, below half the rate.
-        bands = [o for o in axes[0].octaves if o.high_hz <= 0.5 * recording.rate_hz]
         by_axis = [{o.low_hz: o.density for o in axis.octaves} for axis in axes]
-        bands = [o for o in bands if all(o.low_hz in one for one in by_axis)]
+        bands = [o for o in axes[0].octaves if all(o.low_hz in one for one in by_axis)]
+        bands = [o for o in bands if o.high_hz <= 0.5 * seen.rate_hz]
         if len(bands) < FEWEST_OCTAVES:
             continue
-        low_pass = _low_pass(axes)
-        rounding = np.array([axis.step**2 / (12.0 * recording.rate_hz) for axis in axes])
+        rounding = np.array([axis.step**2 / (12.0 * seen.rate_hz) for axis in axes])
         density = np.array([[one[o.low_hz].value for one in by_axis] for o in bands])
         relative = np.array([[one[o.low_hz].sigma_log for one in by_axis] for o in bands])
         out[str(name)] = noise_of_octaves(
             np.array([(o.low_hz, o.high_hz) for o in bands]),
             np.maximum(density - rounding, 1e-3 * density),
             relative,
-            1.0 / recording.rate_hz,
-            low_pass,
+            1.0 / seen.rate_hz,
+            _low_pass(axes),
             _white(axes),
         )
     return out
@@ -215,7 +211,8 @@ def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosis
 
 
 def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
-    poses = _of_poses(found)
+    seen = sampled(found.recording, found.segments.poses, model_of_diagnosis(found))
+    poses = _of_poses(seen)
     for name in ("accelerometer", "gyroscope"):
         differing = [n for n in found.noise_compared if n.significant and n.sensor == name]
         terms: dict[str, list[float]] = {}
@@ -239,7 +236,6 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
                 terms["B"] = list(noise.B)
         if "Q" in terms:
             # N from neighbouring samples includes quantisation noise: N and Q are from one fit, without a low-pass.
-            seen = sampled(found.recording, found.segments.poses, model_of_diagnosis(found))
             both = white_and_quantisation_of(seen, name)
             if both:
                 terms |= both

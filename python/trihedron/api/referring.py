@@ -29,7 +29,7 @@ from trihedron.records.diagnosis import (
     Verdict,
 )
 from trihedron.records.domains import DomainTest
-from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceMotion
+from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, ReferenceMotion
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 
@@ -96,22 +96,17 @@ def calibration_by(
             f"{recording.source}: a calibration contains an accelerometer too, and this log has none; "
             "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's parameters."
         )
-    gyro = found.gyroscope
-    method = f"reference ({found.kind})"
-    gyroscope = SensorCalibration(gyro.S, gyro.b, gyro.covariance, recording.gyroscope_unit.value, "rad/s", method)
+    fitted, gyroscope = _sensors(found, recording, f"reference ({found.kind})")
     findings: tuple[Finding, ...] = (*recording.findings, *found.findings)
     wanted: Frame = frame or "lower"
-    if found.accelerometer is not None:
-        force = found.accelerometer
-        accelerometer = SensorCalibration(
-            force.S, force.b, force.covariance, recording.accelerometer_unit.value, "m/s^2", method
-        )
+    if fitted is not None:
+        accelerometer = fitted
     else:
         accelerometer, finding = _nominal(recording, gravity)
         findings, wanted = (*findings, finding), "case"
     covariance = np.zeros((24, 24))
     covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
-    if found.accelerometer is not None:
+    if fitted is not None:
         # An error of the reference's body frame rotates both sensors alike.
         of_force, of_rate = (turns_of_frame(one.S, one.b) for one in (accelerometer, gyroscope))
         sides = (accelerometer.covariance, of_force), (gyroscope.covariance, of_rate)
@@ -205,9 +200,8 @@ def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> 
     covariance[12:, 12:] = fit.covariance
     covariance[:12, :12] = model.covariance[:12, :12] if force is None else force.covariance
     # The day-to-day change of the biases is unknown here: only the uncertainty of the fit is used.
-    accelerometer = model.accelerometer
-    if force is not None:
-        accelerometer = replace(accelerometer, S=force.S, b=force.b)
+    own = model.accelerometer
+    accelerometer = own if force is None else replace(own, S=force.S, b=force.b)
     unit = "counts" if model.gyroscope is None else model.gyroscope.unit
     seen = FittedModel(accelerometer, FittedSensor(fit.S, fit.b, unit), covariance)
     numbers = compare_numbers(model, seen, alpha=alpha).parameters
@@ -222,12 +216,11 @@ def diagnosis_by(
     parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
     test = _rate(found)
     left = replace(test, disagrees=False) if effects else test
-    verdict: Verdict = "consistent"
-    if any(p.significant for p in parameters):
-        verdict = "parameters-differ"
-    if effects:
-        verdict = "missing-physics"
-    linear = _linear(found, recording)
+    differ = any(p.significant for p in parameters)
+    verdict: Verdict = "missing-physics" if effects else "parameters-differ" if differ else "consistent"
+    nothing = SensorCalibration(np.zeros((3, 3)), np.zeros(3), np.zeros((12, 12)), "none", "m/s^2", "none")
+    force, gyro = _sensors(found, recording, "reference")
+    linear = LinearModel.of_sensors(force or nothing, gyro)
     return Diagnosis(
         verdict=verdict,
         domains=(test,),
@@ -257,12 +250,13 @@ def _rate(found: AgainstReference) -> DomainTest:
     )  # fmt: skip
 
 
-def _linear(found: AgainstReference, recording: Recording) -> LinearModel:
-    def sensor(fit: FitToReference, raw: str, si: str) -> SensorCalibration:
-        return SensorCalibration(fit.S, fit.b, fit.covariance, raw, si, "reference")
-
-    gyro = sensor(found.gyroscope, recording.gyroscope_unit.value, "rad/s")
-    if found.accelerometer is None:
-        nothing = SensorCalibration(np.zeros((3, 3)), np.zeros(3), np.zeros((12, 12)), "none", "m/s^2", "none")
-        return LinearModel.of_sensors(nothing, gyro)
-    return LinearModel.of_sensors(sensor(found.accelerometer, recording.accelerometer_unit.value, "m/s^2"), gyro)
+def _sensors(
+    found: AgainstReference, recording: Recording, method: str
+) -> tuple[SensorCalibration | None, SensorCalibration]:
+    """Both sensors as they were fitted; the accelerometer where the reference determines it."""
+    gyro, force = found.gyroscope, found.accelerometer
+    rate_unit, unit = recording.gyroscope_unit.value, recording.accelerometer_unit.value
+    return (
+        None if force is None else SensorCalibration(force.S, force.b, force.covariance, unit, "m/s^2", method),
+        SensorCalibration(gyro.S, gyro.b, gyro.covariance, rate_unit, "rad/s", method),
+    )
