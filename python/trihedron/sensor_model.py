@@ -191,6 +191,8 @@ def _reframed(calibration: Calibration, change: Reframing, frame: Frame) -> Cali
     n = len(calibration.covariance)
     jacobian = np.zeros((n, n))
     jacobian[:12, :12] = change.jacobian
+    if frame == "lower":
+        jacobian[[1, 2, 5]] = 0.0  # entries of S that the frame fixes at 0: anything else is rounding
     accelerometer, gyroscope = calibration.accelerometer, calibration.gyroscope
     if gyroscope is not None:
         jacobian[12:, 12:], jacobian[12:, :12] = change.follow(gyroscope.S, gyroscope.b)

@@ -6,6 +6,7 @@ import functools
 import inspect
 import math
 import os
+import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from importlib import import_module
@@ -83,20 +84,17 @@ def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
         if isinstance(value, str | bytes | os.PathLike):
             return _path(where, value)
         if not kinds & {one.__name__ for one in type(value).__mro__}:
-            raise WrongTypeError(f"{where} is the name of a file or {_ours(kinds)}, not {said(value)}.")
+            ours = " or a ".join(sorted(kinds - _PATH)) or "record"
+            raise WrongTypeError(f"{where} is the name of a file or a {ours}, not {said(value)}.")
     return value
 
 
+_UNION = re.compile(r"\|(?![^\[\]]*(?:\[[^\[\]]*\][^\[\]]*)*\])")
+"""The bars between the parts of a union type; those inside brackets do not split it."""
+
+
 def _alternatives(annotation: str) -> list[str]:
-    """The top-level parts of a union type; those inside brackets are not split."""
-    parts, depth = [""], 0
-    for letter in annotation:
-        depth += (letter == "[") - (letter == "]")
-        if letter == "|" and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    return [part.strip() for part in parts]
+    return [part.strip() for part in _UNION.split(annotation)]
 
 
 def _number(where: str, name: str, value: Any) -> float:
@@ -188,18 +186,11 @@ def _whole_of_any(where: str, value: Any) -> int:
 
 
 def _pair(where: str, value: Any) -> tuple[float, float]:
-    if isinstance(value, str | bytes | dict) or not hasattr(value, "__len__") or len(value) != len(("from", "to")):
+    is_pair = not isinstance(value, str | bytes | dict) and hasattr(value, "__len__") and len(value) == 2
+    if not is_pair or not all(isinstance(v, Real) and not isinstance(v, bool) and not math.isnan(v) for v in value):
         raise WrongTypeError(f"{where} is a list of pairs (from, to) in seconds, and {said(value)} is none.")
     start, stop = value
-    for edge in (start, stop):
-        if isinstance(edge, bool) or not isinstance(edge, Real) or math.isnan(edge):
-            raise WrongTypeError(f"{where} is a list of pairs (from, to) in seconds, and {said(value)} is none.")
     return float(start), float(stop)
-
-
-def _ours(kinds: set[str]) -> str:
-    names = sorted(kinds - _PATH)
-    return "a " + " or a ".join(names) if names else "a record"
 
 
 _PATH = {"str", "os.PathLike[str]"}

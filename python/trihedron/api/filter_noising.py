@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -103,7 +104,10 @@ def filter_noise(
     band = BAND_PART * recording.rate_hz if band_hz is None else float(band_hz)
     if isinstance(static, str | os.PathLike) and not os.fspath(static).lower().endswith(".json"):
         static = allan(read(static))
-    segments = None if static is not None and reference is not None else _segments(recording)
+    segments = None
+    if static is None or reference is None:
+        with suppress(*INPUT_ERRORS):
+            segments = segment(recording)
     own = None if segments is None else _of_rest(recording, segments)
     # The log's own rest is no other log: its faults are those of the recording already.
     of_own = () if own is None else tuple(f for f in own.findings if f.code in NOT_OF_THE_SENSOR)
@@ -122,7 +126,7 @@ def filter_noise(
         source, findings = motion.source, (*findings, *motion.findings, *of_motion, *about)
     else:
         assert own is not None
-        sensors = tuple(_static_sensor(own, sensor, known) for sensor in UNITS if static_noise(own.axes, UNITS[sensor]))
+        sensors = tuple(_static_sensor(own, sensor, rest, known) for sensor, rest in _sensors(own).items())
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
         findings = (*findings, Finding.of("filter-noise-static"), *too_sure(tilt))
@@ -158,13 +162,6 @@ def _no_noise(recording: Recording, segments: Segments | None, in_counts: str, *
         f"{recording.source}: {why}, so it shows no noise of its own; noise in motion needs known motion "
         f"beside it (--reference){remedy}."
     )
-
-
-def _segments(recording: Recording) -> Segments | None:
-    try:
-        return segment(recording)
-    except INPUT_ERRORS:
-        return None
 
 
 def _longest_rest(recording: Recording, segments: Segments | None) -> slice | None:
@@ -235,14 +232,11 @@ def _bounded(figure: NoiseFigure) -> Bounded:
     return Bounded(0.0 if is_limit else value, 0.0 if is_limit else value / FILE_PART, value * FILE_PART, is_limit)
 
 
-def _static_sensor(own: Noise, sensor: str, known: Static) -> SensorFilterNoise:
-    """Filter noise of a sensor from this log's own static interval, with the static values."""
-    unit = UNITS[sensor]
-    found = static_noise(own.axes, unit)
-    assert found is not None
+def _static_sensor(own: Noise, sensor: str, rest: StaticNoise, known: Static) -> SensorFilterNoise:
+    """Filter noise of a sensor from this log's own static interval, ``rest``, with the static values."""
     return SensorFilterNoise(
-        "gyroscope" if sensor == "gyroscope" else "accelerometer", unit, found.N, found.K, known.get(sensor),
-        BiasModel("walk", 0.0), unlike_axes(own.axes, unit), is_only_static=True,
+        "gyroscope" if sensor == "gyroscope" else "accelerometer", UNITS[sensor], rest.N, rest.K, known.get(sensor),
+        BiasModel("walk", 0.0), unlike_axes(own.axes, UNITS[sensor]), is_only_static=True,
     )  # fmt: skip
 
 

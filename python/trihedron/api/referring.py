@@ -115,7 +115,7 @@ def calibration_by(
     calibration = Calibration(
         accelerometer, gyroscope, covariance, "case", gravity, source, recording.source, recording.sha256, findings
     )
-    return calibration if wanted == "case" else _without_rounding(in_frame(calibration, wanted))
+    return in_frame(calibration, wanted)
 
 
 def _contained(frame: FloatArray, sides: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
@@ -126,20 +126,6 @@ def _contained(frame: FloatArray, sides: Sequence[tuple[FloatArray, FloatArray]]
         values, vectors = np.linalg.eigh(np.linalg.solve(half, np.linalg.solve(half, frame).T))
         frame = half @ (vectors * np.clip(values, 0.0, 1.0)) @ vectors.T @ half.T
     return frame
-
-
-def _without_rounding(calibration: Calibration) -> Calibration:
-    """Entries of S that are 0 in the lower frame get value and uncertainty 0: anything else is rounding."""
-    if calibration.frame != "lower" or calibration.gyroscope is None:
-        return calibration
-    covariance = np.array(calibration.covariance)
-    fixed = [1, 2, 5]
-    covariance[fixed], covariance[:, fixed] = 0.0, 0.0
-    return replace(
-        calibration,
-        covariance=covariance,
-        accelerometer=replace(calibration.accelerometer, covariance=covariance[:12, :12]),
-    )
 
 
 def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, Finding]:
