@@ -36,21 +36,18 @@ def settle_gravity(
         raise InputError("a height alone does not determine gravity: give --latitude with --height, or --gravity.")
     if known is not None:
         return *known, ()
-    return STANDARD_GRAVITY_M_S2, "not given, standard value", (_defaulted(),)
-
-
-def gravity_of(calibration: Calibration | None) -> tuple[float, str] | None:
-    """|g| [m/s²] of a calibration and the words for this source; ``None`` without one."""
-    return None if calibration is None else (calibration.gravity_m_s2, "that of the calibration")
-
-
-def _defaulted() -> Finding:
     low, high = normal_gravity(0.0, 3000.0), normal_gravity(90.0)
     wrong = 100.0 * max(STANDARD_GRAVITY_M_S2 - low, high - STANDARD_GRAVITY_M_S2) / STANDARD_GRAVITY_M_S2
-    return Finding.of(
+    defaulted = Finding.of(
         "gravity-defaulted",
         gravity_m_s2=STANDARD_GRAVITY_M_S2,
         low_m_s2=low,
         high_m_s2=high,
         possible_error_percent=wrong,
     )
+    return STANDARD_GRAVITY_M_S2, "not given, standard value", (defaulted,)
+
+
+def gravity_of(calibration: Calibration | None) -> tuple[float, str] | None:
+    """|g| [m/s²] of a calibration and the words for this source; ``None`` without one."""
+    return None if calibration is None else (calibration.gravity_m_s2, "that of the calibration")

@@ -160,11 +160,9 @@ def noise_of_file(
         )
     if exclude_s:
         raise InputError(f"{path}: nothing can be excluded from a log that is read in one pass; cut the file instead.")
-
-    kept = None
-    if checkpoint is not None:
-        kept = Checkpoint(Path(checkpoint), made_of(log.path, "allan", rate_hz, log.roles, factor))
-    done, state = kept.load() if kept else (0, {})
+    kept_in = None if checkpoint is None else Path(checkpoint)
+    kept = Checkpoint(kept_in, made_of(log.path, "allan", rate_hz, log.roles, factor))
+    done, state = kept.load()
 
     def parts() -> Iterator[npt.NDArray[np.float64]]:
         for part in log.chunks(first=done):
@@ -172,10 +170,9 @@ def noise_of_file(
 
     found = stream_noise(
         parts(), rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path), state=state,
-        keep=kept.keep if kept else None,
+        keep=kept.keep,
     )  # fmt: skip
-    if kept:
-        kept.remove()
+    kept.remove()
     return found
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,15 +23,6 @@ STEP_S = 0.25
 """Length of a block of a replayed log [s], as in a live session."""
 
 OnPose = Callable[[GuideView], Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Replay:
-    """Final state of the guide, the part of the log that it used, and the start of its verification poses."""
-
-    view: GuideView
-    recording: Recording
-    cut_s: float | None
 
 
 def guide(
@@ -71,13 +61,16 @@ def guide(
     >>> calibrated, checked = trihedron.guide("session.csv", "accel 0.1 %, gyro 0.2 %")  # doctest: +SKIP
     """
     wanted, gravity = Accuracy.parse(accuracy), settle_gravity(gravity_m_s2, latitude_deg, height_m)[0]
-    done = replay(recording_of(recording), wanted, gravity_m_s2=gravity, on_pose=on_pose)
+    _, used, cut_s = replay(recording_of(recording), wanted, gravity_m_s2=gravity, on_pose=on_pose)
     said = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
-    return conclude(done.recording, done.cut_s, **said)
+    return conclude(used, cut_s, **said)
 
 
-def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: OnPose | None = None) -> Replay:
-    """Run the guide on a log, block by block, as in a live session.
+def replay(
+    recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_pose: OnPose | None = None
+) -> tuple[GuideView, Recording, float | None]:
+    """Final state of the guide on a log, block by block as in a live session, the part of the log that it used, and the
+    start of its verification poses.
 
     Raises ``InputError`` when the log has no accelerometer.
     """
@@ -98,7 +91,7 @@ def replay(recording: Recording, wanted: Accuracy, *, gravity_m_s2: float, on_po
                 on_pose(view)
         if made.is_done:
             break
-    return Replay(made.finish(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s)
+    return made.finish(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s
 
 
 def steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:

@@ -82,28 +82,17 @@ def _common(
     # Frame lower fixes three entries of S at 0: their rows of the covariance are exactly 0.
     for fixed in (1, 2, 5):
         full[fixed], full[:, fixed] = 0.0, 0.0
-    sensors: list[SensorCalibration | None] = []
-    for k, sensor in enumerate((first.accelerometer, first.gyroscope)):
-        if sensor is None:
-            sensors.append(None)
-            continue
-        own = slice(12 * k, 12 * k + 12)
-        sensors.append(
-            replace(
-                sensor,
-                S=parameters[own][:9].reshape(3, 3),
-                b=parameters[own][9:],
-                covariance=full[own, own],
-                method=f"{len(sessions)} recordings, random effects",
-                quality=None,
-                observability=None,
-            )
-        )
-    assert sensors[0] is not None
+
+    def moved(sensor: SensorCalibration, at: int) -> SensorCalibration:
+        own = slice(at, at + 12)
+        S, b, method = parameters[own][:9].reshape(3, 3), parameters[own][9:], f"{len(sessions)} recordings"
+        of_fit = {"method": f"{method}, random effects", "quality": None, "observability": None}
+        return replace(sensor, S=S, b=b, covariance=full[own, own], **of_fit)  # type: ignore[arg-type]
+
     return replace(
         first,
-        accelerometer=sensors[0],
-        gyroscope=sensors[1],
+        accelerometer=moved(first.accelerometer, 0),
+        gyroscope=None if first.gyroscope is None else moved(first.gyroscope, 12),
         covariance=full,
         recording_source=", ".join(session.name for session in sessions),
         recording_sha256="",

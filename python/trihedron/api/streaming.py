@@ -49,10 +49,9 @@ def segment_file(
     view = cast("Recording", log)
     sums = BlockSums(view)
     width = sums.length * max(1, PIECE_ROWS // sums.length)
-    kept = None
-    if checkpoint is not None:
-        kept = Checkpoint(Path(checkpoint), made_of(log.log.path, "blocks", log.rate_hz, log.log.roles))
-    done, state = kept.load() if kept else (0, {})
+    path = None if checkpoint is None else Path(checkpoint)
+    kept = Checkpoint(path, made_of(log.log.path, "blocks", log.rate_hz, log.log.roles))
+    done, state = kept.load()
     if done:
         sums.restore(done, state)
     for part in log.log.chunks(width, done):
@@ -60,11 +59,9 @@ def segment_file(
         sums.add([np.ascontiguousarray(t, dtype=np.float64) for t in triads])
         done += len(part)
         notify(0.8 * done / log.n_samples, f"{done} of {log.n_samples} rows")
-        if kept:
-            kept.keep(done, sums.state)
+        kept.keep(done, sums.state)
     segments = segment_blocks(view, sums.channels(), progress=lambda f, text: notify(0.8 + 0.2 * f, text))
-    if kept:
-        kept.remove()
+    kept.remove()
     return segments
 
 

@@ -57,9 +57,9 @@ def guide(
         if every:
             put(as_text(view, *_size()) + "\n")
 
-    done = replay(source.read(), wanted, gravity_m_s2=place.gravity_m_s2, on_pose=notify)
-    put(as_text(done.view, *_size()) + "\n")
-    finish(done.recording, done.cut_s, place, output, force=force)
+    view, used, cut_s = replay(source.read(), wanted, gravity_m_s2=place.gravity_m_s2, on_pose=notify)
+    put(as_text(view, *_size()) + "\n")
+    finish(used, cut_s, place, output, force=force)
 
 
 def _size() -> tuple[int, int]:

@@ -101,13 +101,10 @@ class Results:
 
 
 @dataclass(frozen=True)
-class _Extent:
-    full: bool = False
-
-
-@dataclass(frozen=True)
-class FullResults(Results, _Extent):
+class FullResults(Results):
     """Output files of a result whose whole report is printed with ``--full`` only."""
+
+    full: bool = False
 
     def show(self, document: Document, sections: int | None) -> None:
         """Print the first ``sections``, or with ``--full`` all."""

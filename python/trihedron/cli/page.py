@@ -63,6 +63,13 @@ class _QuietServer(ThreadingHTTPServer):
         """Print nothing: a page closed during a response is no error."""
 
 
+def _begin(request: BaseHTTPRequestHandler, status: int, headers: dict[str, str]) -> None:
+    request.send_response(status)
+    for name, value in headers.items():
+        request.send_header(name, value)
+    request.end_headers()
+
+
 class Page:
     """Serves the page until closed; ``address`` includes a token that is valid once.
 
@@ -134,33 +141,23 @@ class Page:
 
     def _reject(self, request: BaseHTTPRequestHandler, sentence: str, status: int = 403) -> None:
         body = (sentence + "\n").encode()
-        request.send_response(status)
-        request.send_header("Content-Type", "text/plain; charset=utf-8")
-        request.send_header("Content-Length", str(len(body)))
-        request.end_headers()
+        _begin(request, status, {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
         request.wfile.write(body)
 
     def _send_page(self, request: BaseHTTPRequestHandler) -> None:
         nonce = secrets.token_urlsafe(16)
         text = files("trihedron.cli").joinpath("page.html").read_text("utf-8").replace("{{nonce}}", nonce)
         body = text.replace("{{body}}", files("trihedron.report").joinpath("body.js").read_text("utf-8")).encode()
-        request.send_response(200)
-        request.send_header("Content-Type", "text/html; charset=utf-8")
-        request.send_header("Content-Length", str(len(body)))
-        request.send_header("Set-Cookie", f"{COOKIE}={self._session}; HttpOnly; SameSite=Strict; Path=/")
         policy = f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'"
-        request.send_header("Content-Security-Policy", policy)
-        request.send_header("Referrer-Policy", "no-referrer")
-        request.send_header("Cache-Control", "no-store")
-        request.end_headers()
+        cookie = f"{COOKIE}={self._session}; HttpOnly; SameSite=Strict; Path=/"
+        headers = {"Content-Type": "text/html; charset=utf-8", "Content-Length": str(len(body)), "Set-Cookie": cookie}
+        headers |= {"Content-Security-Policy": policy, "Referrer-Policy": "no-referrer", "Cache-Control": "no-store"}
+        _begin(request, 200, headers)
         request.wfile.write(body)
 
     def _stream(self, request: BaseHTTPRequestHandler) -> None:
-        request.send_response(200)
-        request.send_header("Content-Type", "text/event-stream")
-        request.send_header("Cache-Control", "no-store")
-        request.send_header("Connection", "close")
-        request.end_headers()
+        kind = "text/event-stream"
+        _begin(request, 200, {"Content-Type": kind, "Cache-Control": "no-store", "Connection": "close"})
         request.close_connection = True
         seen = 0
         try:

@@ -31,9 +31,9 @@ def made_of(path: Path, *said: object) -> str:
 
 @dataclass(eq=False)
 class Checkpoint:
-    """A file with the state of a pass; ``made_of`` identifies its log and options."""
+    """A file with the state of a pass; ``made_of`` identifies its log and options. Without a path nothing is kept."""
 
-    path: Path
+    path: Path | None
     made_of: str
     every_s: float = EVERY_S
     _kept_at: float = field(default_factory=time.monotonic, init=False)
@@ -44,7 +44,7 @@ class Checkpoint:
         Raises ``InputError`` when the file is no checkpoint, or one of another log or other options; it is not
         changed.
         """
-        if not self.path.exists():
+        if self.path is None or not self.path.exists():
             return 0, {}
         try:
             # Checkpoints are stored uncompressed: a compressed file is another program's and may unpack to any size.
@@ -67,7 +67,7 @@ class Checkpoint:
 
     def keep(self, rows: int, state: Callable[[], Mapping[str, FloatArray]]) -> None:
         """Save the result of ``state()`` after ``rows`` rows, if the last checkpoint is ``every_s`` old."""
-        if time.monotonic() - self._kept_at < self.every_s:
+        if self.path is None or time.monotonic() - self._kept_at < self.every_s:
             return
         stream = io.BytesIO()
         own = {_MADE_OF: np.array(self.made_of), _ROWS: np.array(rows)}
@@ -77,4 +77,5 @@ class Checkpoint:
 
     def remove(self) -> None:
         """Delete the checkpoint, after the pass is complete."""
-        self.path.unlink(missing_ok=True)
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)

@@ -103,7 +103,8 @@ def fleet(
     todo = list({job.key: job for job in jobs if job.key not in rows}.values())
     n_before = len(rows)
     for done, (job, row) in enumerate(_results(todo, options, scheduler, workers), 1):
-        _keep(folder, job, row)
+        # One file per result, written atomically: a killed run leaves no partial result.
+        write_whole(folder / RESULTS / f"{job.key}.json", json.dumps(plain(row), allow_nan=False), overwrite=True)
         rows[job.key] = _of_table(row)
         notify(done / len(todo), f"{n_before + done} of {n_before + len(todo)} logs")
     made = [{"path": job.path, "name": job.name, "serial": job.serial, "key": job.key} | rows[job.key] for job in jobs]
@@ -127,12 +128,6 @@ def _kept(folder: Path, job: Job) -> Row | None:
     except (OSError, ValueError):
         return None
     return None if row.get("status") == "crashed" else _of_table(row)
-
-
-def _keep(folder: Path, job: Job, row: Row) -> None:
-    """Write one file per result, atomically: a killed run leaves no partial result."""
-    text = json.dumps(plain(row), allow_nan=False)
-    write_whole(folder / RESULTS / f"{job.key}.json", text, overwrite=True)
 
 
 def _results(

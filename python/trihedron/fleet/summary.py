@@ -100,9 +100,7 @@ def _log(row: dict[str, Any]) -> FleetLog:
         serious=tuple(row.get("serious", ())),
         is_trustworthy=bool(row.get("is_trustworthy", False)),
         n_poses=row.get("n_poses"),
-        static_rms_m_s2=row.get("static_rms_m_s2"),
         held_out_rms_m_s2=row.get("held_out_rms_m_s2"),
-        seconds=row.get("seconds"),
         numbers=None if covariance is None else np.array(row["parameters"], dtype=np.float64),
         std=None if covariance is None else sigmas_of(np.array(covariance, dtype=np.float64)),
         reread=row.get("reread", ""),
@@ -178,7 +176,7 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[tuple[Outlier, ...],
             sigmas = float(column[worst] - others.mean()) / max(spread, TINY)
             p = min(1.0, fdtrc(1, prior_dof + dof, sigmas**2) * n_tests)
             away = float(column[worst] - np.median(others))
-            one = Outlier(names[kept[worst]], PARAMETERS[k], float(column[worst]), away, sigmas, p)
+            one = Outlier(names[kept[worst]], PARAMETERS[k], away, sigmas, p)
             if p >= FALSE_ALARM:
                 within.append(one)
                 break

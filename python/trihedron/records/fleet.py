@@ -22,9 +22,7 @@ class FleetLog:
     serious: tuple[str, ...]
     is_trustworthy: bool
     n_poses: int | None
-    static_rms_m_s2: float | None
     held_out_rms_m_s2: float | None
-    seconds: float | None
     numbers: FloatArray | None
     std: FloatArray | None
     reread: str = ""
@@ -38,7 +36,6 @@ class Outlier:
 
     serial: str
     parameter: Parameter
-    value: float
     deviation: float
     sigmas: float
     p_adjusted: float

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copyreg
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from trihedron.answers import ask
-from trihedron.records.frozen import Frozen
+from trihedron.records.frozen import Frozen, frozen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,13 +77,5 @@ class Printed(Presented):
         return self.as_text()
 
 
-def _read_only(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
-    return MappingProxyType(dict(mapping))
-
-
-def _reduced(mapping: MappingProxyType[Any, Any]) -> tuple[Any, tuple[dict[Any, Any]]]:
-    return _read_only, (dict(mapping),)
-
-
 # Pickle and deepcopy do not support read-only views of dictionaries without this.
-copyreg.pickle(MappingProxyType, _reduced)
+copyreg.pickle(MappingProxyType, lambda mapping: (frozen, (dict(mapping),)))
