@@ -172,7 +172,11 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
         (calibration.accelerometer.S, calibration.accelerometer.b),
         None if gyroscope is None else (gyroscope.S, gyroscope.b),
     )
-    findings = tuple(_not_applied(effect_id, why) for effect_id, why in done.left_out.items())
+    of_session = words("effect-of-session")
+    findings = tuple(
+        Finding.of("effect-not-applied", "of-session" if why == of_session else "", effect=effect_id, why=why)
+        for effect_id, why in done.left_out.items()
+    )
     linear = replace(recording, accelerometer=done.accelerometer, gyroscope=done.gyroscope)
     return at_reference(calibration, linear), findings
 
@@ -205,8 +209,3 @@ def doubted(calibration: Calibration) -> tuple[Finding, ...]:
         return ()
     seen, action = (words("quoted", sentence=sentence) for sentence in (grave[0].seen, grave[0].action))
     return (Finding.of("calibration-doubted", seen=seen, action=action),)
-
-
-def _not_applied(effect_id: str, why: str) -> Finding:
-    is_of_session = why == words("effect-of-session")
-    return Finding.of("effect-not-applied", "of-session" if is_of_session else "", effect=effect_id, why=why)

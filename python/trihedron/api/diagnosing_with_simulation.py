@@ -101,23 +101,21 @@ def opened(against: GivenModel) -> GivenModel:
     return against
 
 
-def _simulated_log(
-    against: GivenModel, recording: Recording, segments: Segments, gravity: float
-) -> tuple[Recording, Scenario | None]:
+def _simulated_log(against: GivenModel, recording: Recording, segments: Segments, gravity: float) -> Recording:
     if isinstance(against, Recording):
-        return against, None
+        return against
     if not isinstance(against, Scenario):
         if not isinstance(against, str | os.PathLike):
             kind = type(against).__name__
             raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
-        return read(against), None
+        return read(against)
     if recording.gyroscope is None:
         raise InputError(
             "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
             "or compare with a simulated log of your own"
         )
     own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
-    return driven(against, recording, segments, own), against
+    return driven(against, recording, segments, own)
 
 
 def simulated_beside(
@@ -125,14 +123,23 @@ def simulated_beside(
 ) -> tuple[Simulated, Recording, Segments, tuple[Finding, ...]]:
     """The simulation's own diagnosis, the recording with the sensors that both have, its segments, and findings."""
     notify(0.05, "diagnosing the simulated recording")
-    logged = _simulated_log(against, recording, segments, gravity)
-    logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
-    simulated = _simulation(logged, gravity, alpha, lambda fraction, text: notify(0.05 + 0.4 * fraction, text))
-    return simulated, recording, segments, one_sided
+    theirs = _simulated_log(against, recording, segments, gravity)
+    one_sided: tuple[Finding, ...] = ()
+    if (theirs.gyroscope is None) != (recording.gyroscope is None):
+        which = "recording" if recording.gyroscope is None else "simulation"
+        one_sided = (Finding.of("gyroscope-left-out", "one-has-none", which=which),)
+        if recording.gyroscope is None:
+            theirs = replace(theirs, gyroscope=None)
+        else:
+            recording, segments = accelerometer_only(recording, segments)
+    scenario = against if isinstance(against, Scenario) else None
+    later: Progress = lambda fraction, text: notify(0.05 + 0.4 * fraction, text)  # noqa: E731
+    return _simulation(theirs, scenario, gravity, alpha, later), recording, segments, one_sided
 
 
-def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, notify: Progress) -> Simulated:
-    recording, scenario = logged
+def _simulation(
+    recording: Recording, scenario: Scenario | None, gravity: float, alpha: float, notify: Progress
+) -> Simulated:
     of_world = rates_of_world(recording, segment(recording))
     if of_world is not None:
         recording = replace(recording, gyroscope=None)
@@ -148,20 +155,6 @@ def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha
     noise = sampled(recording, result.segments.poses, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)
     return Simulated(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
-
-
-def _both_sensors(
-    logged: tuple[Recording, Scenario | None], recording: Recording, segments: Segments
-) -> tuple[tuple[Recording, Scenario | None], Recording, Segments, tuple[Finding, ...]]:
-    """Both sides without the gyro where one side has none."""
-    theirs, scenario = logged
-    if (theirs.gyroscope is None) == (recording.gyroscope is None):
-        return logged, recording, segments, ()
-    if recording.gyroscope is None:
-        finding = Finding.of("gyroscope-left-out", "one-has-none", which="recording")
-        return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
-    finding = Finding.of("gyroscope-left-out", "one-has-none", which="simulation")
-    return logged, *accelerometer_only(recording, segments), (finding,)
 
 
 def _noise(

@@ -100,6 +100,8 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
     base, model, finding = result.calibration, diagnosis.extended, _modelled(diagnosis)
     assert model.covariance is not None
     covariance = model.covariance
+    # What the effects do not answer; the diagnosis has judged g-sensitivity.
+    left = (one for one in not_explained(base.findings, diagnosis.remaining) if one.code != "gyro-g-sensitivity")
     return replace(
         base,
         accelerometer=_sensor(base.accelerometer, model.accelerometer, covariance[:12, :12]),
@@ -107,7 +109,7 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
         if base.gyroscope is None or model.gyroscope is None
         else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
         covariance=covariance,
-        findings=(*_left(base, diagnosis), finding, *_drifts(diagnosis)),
+        findings=(*left, finding, *_drifts(diagnosis)),
         extensions=MappingProxyType(
             {
                 **base.extensions,
@@ -118,13 +120,6 @@ def _extended(result: CalibrationResult, diagnosis: Diagnosis) -> Calibration:
             }
         ),
     )
-
-
-def _left(base: Calibration, diagnosis: Diagnosis) -> Iterator[Finding]:
-    """Findings of the linear calibration that its effects do not answer; the diagnosis has judged g-sensitivity."""
-    for one in not_explained(base.findings, diagnosis.remaining):
-        if one.code != "gyro-g-sensitivity":
-            yield one
 
 
 def _drifts(diagnosis: Diagnosis) -> Iterator[Finding]:

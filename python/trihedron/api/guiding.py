@@ -27,6 +27,7 @@ from trihedron.units import (
 SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
 USUAL_POSE_S = 4.0
 _NOT_THE_FIT = ("gravity-defaulted", "unit-contradicted")
+QUIET = ("few-poses", "unit-detected")
 POSES_PER_GOAL = 2.5
 """Allowed error of a single pose in multiples of the target accuracy: averaging over a dozen poses does the rest."""
 
@@ -58,6 +59,7 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
     needed = poses_needed(known, wanted, factor, shortfall)
     if needed is not None:
         needed = max(needed, LEAST_POSES - len(up))
+    doubts, found = _doubts(calibration), (*recording.findings, *segments.findings)
     uncertain = _uncertain(now, after, wanted, has_gyroscope=known.gyroscope is not None)
     return Examination(
         poses_up=up,
@@ -68,9 +70,9 @@ def examine(recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = S
         why=_why(uncertain, LEAST_POSES - len(up) if shortfall <= 1.0 else 0),
         poses_needed=needed,
         pose_s=_pose_s(known.pose_sigma, accuracy, segments),
-        warnings=(*_doubts(calibration), *_warnings(recording, segments))[:4],
+        warnings=(*doubts, *(f.seen for f in found if f.severity is not Severity.NOTE and f.code not in QUIET))[:4],
         rate_hz=recording.rate_hz,
-        doubts=_doubts(calibration),
+        doubts=doubts,
         centre=centre,
         matrix=matrix,
     )
@@ -204,12 +206,6 @@ def _pose_s(pose_sigma: float, accuracy: Accuracy, segments: Segments) -> float:
     held = float(np.median(segments.duration_s)) if segments.n_poses else USUAL_POSE_S
     excess = pose_sigma / (POSES_PER_GOAL * accuracy.accelerometer)
     return float(np.clip(held * excess**2, SHORTEST_POSE_S, LONGEST_POSE_S))
-
-
-def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
-    quiet = {"few-poses", "unit-detected"}
-    found = [*recording.findings, *segments.findings]
-    return tuple(f.seen for f in found if f.severity is not Severity.NOTE and f.code not in quiet)[:4]
 
 
 def _doubts(calibration: Calibration | None) -> tuple[str, ...]:

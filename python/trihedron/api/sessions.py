@@ -129,11 +129,11 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
         for code in (*gravest, *(code for code in warned if code == "clipping")):
             one = session.name, warned[code], as_arguments(result.recording.source)
             doubted.setdefault(code, []).append(one)
-    stated = {"clipping", *doubted}
-    also = [
-        (session.name, list(dict.fromkeys(f.code for f in result.findings if _is_other(f, stated))))
-        for result, session in zip(results, sessions, strict=True)
-    ]
+    stated = {"clipping", "gravity-defaulted", *doubted}
+    also = []
+    for result, session in zip(results, sessions, strict=True):
+        others = (f.code for f in result.findings if f.severity is Severity.WARNING and f.code not in stated)
+        also.append((session.name, list(dict.fromkeys(others))))
     if any(codes for _, codes in also):
         yield Finding.of("calibration-doubted", "others", recordings=[one for one in also if one[1]])
     for code, said in doubted.items():
@@ -148,10 +148,6 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
             seen=seen,
             path=path,
         )
-
-
-def _is_other(finding: Finding, stated: set[str]) -> bool:
-    return finding.severity is Severity.WARNING and finding.code not in {*stated, "gravity-defaulted"}
 
 
 def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:

@@ -110,9 +110,12 @@ def simulate(
         raise typer.BadParameter("name the log to write with -o LOG, or send it with --serve PTY")
     from trihedron.api.simulating import simulate as run
     from trihedron.api.simulating import twin
-    from trihedron.files.log import write_recording, write_truth
+    from trihedron.files.log import check_suffix, check_truth_suffix, truth_document, write_recording, write_truth
 
-    _check_endings(output, truth)
+    if output is not None:
+        check_suffix(output)
+    if truth is not None:
+        check_truth_suffix(truth)
     read_from = (None if scenario is None else Path(scenario), like, calibration)
     check_outputs(output, truth, force=force, report=report, inputs=read_from)
     beside = ""
@@ -139,7 +142,6 @@ def simulate(
         write_truth(known, truth, overwrite=force)
         say(f"truth: {truth}")
     name_log(LogSource(log=output))
-    from trihedron.files.log import truth_document
     from trihedron.report.simulation import simulation_report
 
     document = simulation_report(recording, known, beside, findings, "" if truth is None else str(truth))
@@ -150,15 +152,6 @@ def simulate(
     say(f"log: {output}")
     show(document, None, sections=len(document.sections) - 1)
     leave(findings)
-
-
-def _check_endings(output: Path | None, truth: Path | None) -> None:
-    from trihedron.files.log import check_suffix, check_truth_suffix
-
-    if output is not None:
-        check_suffix(output)
-    if truth is not None:
-        check_truth_suffix(truth)
 
 
 def _write_template(path: Path, *, force: bool) -> None:

@@ -73,7 +73,10 @@ def _converter() -> Converter:
     plain.register_unstructure_hook_func(is_array, lambda array: array.tolist())
     plain.register_structure_hook_func(is_array, lambda numbers, _: np.array(numbers, dtype=np.float64))
     plain.register_structure_hook(float, lambda number, _: math.nan if number is None else float(number))
-    plain.register_structure_hook_func(_is_mapping, _mapping)
+    plain.register_structure_hook_func(
+        _is_mapping,
+        lambda entries, _: MappingProxyType({name: math.nan if one is None else one for name, one in entries.items()}),
+    )
 
     def of_mapping(entries: MappingProxyType[str, Any]) -> dict[str, Any]:
         return {name: as_plain(one) if isinstance(one, Plain) else thawed(one) for name, one in entries.items()}
@@ -103,7 +106,3 @@ def is_array(kind: Any) -> bool:
 
 def _is_mapping(kind: Any) -> bool:
     return kind is MappingProxyType or get_origin(kind) is MappingProxyType
-
-
-def _mapping(entries: Any, _: Any) -> MappingProxyType[str, Any]:
-    return MappingProxyType({name: math.nan if one is None else one for name, one in entries.items()})
