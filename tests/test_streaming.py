@@ -18,6 +18,7 @@ from trihedron.api import identifying, streaming
 from trihedron.cli import main
 from trihedron.files import checkpoint as kept_file
 from trihedron.files.checkpoint import Checkpoint
+from trihedron.read.on_disk import log_on_disk
 
 COLUMNS = "ax,ay,az,gx,gy,gz"
 
@@ -45,9 +46,7 @@ def path(whole, tmp_path_factory):
 
 
 def opened(path):
-    return streaming.log_on_disk(
-        path, columns=COLUMNS, rate_hz=100.0, accelerometer_unit="m/s^2", gyroscope_unit="rad/s"
-    )
+    return log_on_disk(path, columns=COLUMNS, rate_hz=100.0, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
 
 
 @pytest.mark.parametrize(("ending", "piece"), [("npy", 1 << 18), ("npy", 250), ("parquet", 250), ("csv", 250)])
@@ -105,9 +104,10 @@ def test_memory_stays_bounded(tmp_path):
     script = (
         "import resource, sys\n"
         "from trihedron.api import streaming\n"
+        "from trihedron.read.on_disk import log_on_disk\n"
         "import trihedron.segment\n"
         "low = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
-        "log = streaming.log_on_disk(sys.argv[1], columns='ax,ay,az,gx,gy,gz', rate_hz=1000.0)\n"
+        "log = log_on_disk(sys.argv[1], columns='ax,ay,az,gx,gy,gz', rate_hz=1000.0)\n"
         "segments = streaming.segment_file(log)\n"
         "print(segments.n_poses, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - low) / 1024)\n"
     )
@@ -148,7 +148,7 @@ def test_a_text_that_is_no_table_of_numbers_is_refused_and_leaves_nothing(tmp_pa
     log = tmp_path / "log.csv"
     log.write_text(text)
     with pytest.raises(ValueError, match=said):
-        streaming.log_on_disk(log, columns="-,ax,ay,az", rate_hz=100.0)
+        log_on_disk(log, columns="-,ax,ay,az", rate_hz=100.0)
     assert list(tmp_path.iterdir()) == [log]
 
 
@@ -156,7 +156,7 @@ def test_a_text_with_decimal_commas_missing_fields_and_a_byte_order_mark_is_read
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     log = tmp_path / "log.csv"
     log.write_bytes("\ufefft;ax;ay;az\r\n0;1,5;2;3\r\n0,01;-4;;6\r\n0,02;nan;8;9\r\n".encode())
-    held = streaming.log_on_disk(log, columns="-,ax,ay,az", rate_hz=100.0)
+    held = log_on_disk(log, columns="-,ax,ay,az", rate_hz=100.0)
     np.testing.assert_array_equal(held.accelerometer[0:3], [[1.5, 2, 3], [-4, np.nan, 6], [np.nan, 8, 9]])
     del held
     assert list(tmp_path.iterdir()) == [log]

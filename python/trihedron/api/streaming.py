@@ -21,7 +21,7 @@ from trihedron.errors import InputError
 from trihedron.files.calibration import calibration_text
 from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.ranges import merged
-from trihedron.read.on_disk import LogOnDisk, Triad, log_on_disk  # noqa: F401
+from trihedron.read.on_disk import LogOnDisk, Triad
 from trihedron.records import Move, Pose, Recording, Segments
 from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult

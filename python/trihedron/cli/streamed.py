@@ -11,7 +11,7 @@ from trihedron.cli.options import GravitySource, LogSource, progress
 from trihedron.cli.output import leave, say
 
 if TYPE_CHECKING:
-    from trihedron.api.streaming import LogOnDisk
+    from trihedron.read.on_disk import LogOnDisk
     from trihedron.records.results import CalibrationResult
 
 
@@ -25,7 +25,7 @@ def opened(source: LogSource) -> LogOnDisk:
     """The log on disk; rejected where an option that streaming needs is missing."""
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in ax,ay,az,gx,gy,gz) and --rate")
-    from trihedron.api.streaming import log_on_disk
+    from trihedron.read.on_disk import log_on_disk
 
     # A text log is first converted to a table, which takes time.
     with progress("opening"):
