@@ -65,21 +65,21 @@ def settled(verb: str, name: str, value: Any, annotation: str) -> Any:
         if kind in _PLAIN:
             return _PLAIN[kind](where, name, value)
         if kind.startswith("Callable[") or kind in ("Progress", "OnPose"):
-            return _callable(where, value)
+            if not callable(value) or isinstance(value, type):
+                raise WrongTypeError(f"{where} is a function called with the progress of the work, not {said(value)}.")
+            return value
         if kind.startswith("Sequence["):
             return _listed(where, value, kind.removeprefix("Sequence[").removesuffix("]"))
     if kinds == _PATH:
         return _path(where, value)
-    if kinds == {"Sequence[int]", "IntArray"}:
-        return _listed(where, value, "int")
     if kinds == {"npt.ArrayLike"}:
         return numbers_of(where, value)
     if "str" in kinds and kinds <= {"str", "int", "AccelerationUnit", "RateUnit"}:
         return _whole(where, name, value) if "int" in kinds and isinstance(value, int) else _text(where, name, value)
     listed = [kind for kind in kinds if kind.startswith("Sequence[")]
-    if listed and not isinstance(value, str | os.PathLike):
+    if listed and not (kinds >= _PATH and isinstance(value, str | os.PathLike)):
         return _listed(where, value, listed[0].removeprefix("Sequence[").removesuffix("]"))
-    if kinds > _PATH and not kinds & _JUDGED_BY_THE_VERB:
+    if kinds > _PATH and not kinds & {"Any", "Scenario"}:
         # A path or a name, which the verb itself checks.
         if isinstance(value, str | bytes | os.PathLike):
             return _path(where, value)
@@ -141,12 +141,6 @@ def _switch(where: str, _name: str, value: Any) -> bool:
     return value
 
 
-def _callable(where: str, value: Any) -> Any:
-    if not callable(value) or isinstance(value, type):
-        raise WrongTypeError(f"{where} is a function called with the progress of the work, not {said(value)}.")
-    return value
-
-
 def _path(where: str, value: Any) -> Any:
     try:
         text = os.fspath(value)
@@ -175,14 +169,10 @@ def _listed(where: str, value: Any, inner: str) -> Any:
     if set(_alternatives(inner)) == _PATH:
         return [_path(f"{where}[{k}]", item) for k, item in enumerate(items)]
     if inner == "int":
-        return [_whole_of_any(f"{where}[{k}]", item) for k, item in enumerate(items)]
+        # Cluster sizes from logspace are floats.
+        whole = (int(v) if isinstance(v, float) and v.is_integer() and abs(v) < MOST_WHOLE else v for v in items)
+        return [_whole(f"{where}[{k}]", "", item) for k, item in enumerate(whole)]
     return value
-
-
-def _whole_of_any(where: str, value: Any) -> int:
-    """A whole number given as int or float: cluster sizes from logspace are floats."""
-    is_whole = isinstance(value, float) and value.is_integer() and abs(value) < MOST_WHOLE
-    return _whole(where, "", int(value) if is_whole else value)
 
 
 def _pair(where: str, value: Any) -> tuple[float, float]:
@@ -194,7 +184,6 @@ def _pair(where: str, value: Any) -> tuple[float, float]:
 
 
 _PATH = {"str", "os.PathLike[str]"}
-_JUDGED_BY_THE_VERB = {"Any", "Scenario"}
 _ALIASES = {"AnyReference": {"ReferenceMotion", "Recording", *_PATH}}
 _PLAIN: dict[str, Callable[[str, str, Any], Any]] = {"float": _number, "int": _whole, "str": _text, "bool": _switch}
 # Words of a closed list: the verb checks the choice, only the type is checked here.

@@ -186,11 +186,10 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
         gyroscope_unit=recording.gyroscope_unit,
         temperature_degc=None if recording.temperature_degc is None else recording.temperature_degc[at],
     )
-    try:
+    with suppress(*INPUT_ERRORS):
         found = allan(part)
-    except INPUT_ERRORS:
-        return None
-    return found if _sensors(found) else None
+        return found if _sensors(found) else None
+    return None
 
 
 def _sensors(found: Noise | None) -> Static:
