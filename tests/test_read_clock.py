@@ -6,7 +6,7 @@ import pytest
 from test_read import HEADER, codes, finding, write
 from trihedron.read import ReadError, read_recording
 from trihedron.read.clock.even import find_even_clock
-from trihedron.read.clock.settle import sample_numbers
+from trihedron.read.clock.settle import sample_numbers, settle_clock
 from trihedron.read.clock.unit import parse_time_unit, seconds_of
 from trihedron.records import Severity, TimestampKind
 from trihedron.records.recording import spread_timestamps
@@ -261,3 +261,10 @@ def test_the_period_of_late_timestamps_is_right_on_a_grid_nearly_as_coarse(grid_
         clock = find_even_clock(delivered(np.arange(3000), 0.01, 1e-3, grid_s, seed))
         # An alias of the period is off by a tenth or more.
         assert clock.period_s == pytest.approx(0.01, rel=1e-3)
+
+
+def test_rounded_timestamps_of_one_sensor_are_said_to_be_its_own():
+    rng = np.random.default_rng(0)
+    t = np.round(np.arange(4000) / 99.7, 3)
+    (said,) = settle_clock(t, 0.0, {"gyroscope": rng.normal(size=(4000, 3))}).findings
+    assert said.seen.startswith("The gyro's timestamps are rounded to 1 ms")

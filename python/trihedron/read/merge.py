@@ -98,8 +98,8 @@ def _on_clock_of(base: Sensors, other: Sensors, where: str) -> tuple[Sensors, Fi
     kept_t, kept_v = base_t[kept], kept_v[kept]
     brought, factor = resample(other_t, kept_t, other_v, step)
     variance = float(np.nanmean(factor))
-    n_cut = len(base_t) - len(kept_t)
     n_beyond = int(np.count_nonzero((other_t < kept_t[0] - step) | (other_t > kept_t[-1] + step)))
+    n_lost = int(np.sum(~np.isfinite(brought).all(axis=1) & np.isfinite(kept_v).all(axis=1)))
     note = Finding.of(
         "clocks-merged",
         severity=Severity.WARNING if own == "gyroscope" or variance < QUIETER else Severity.NOTE,
@@ -110,12 +110,11 @@ def _on_clock_of(base: Sensors, other: Sensors, where: str) -> tuple[Sensors, Fi
         other=name.replace("gyroscope", "gyro"),
         same_tick_fraction=float(np.mean(factor == 1.0)),
         variance_factor=variance,
-        cut_rows=n_cut,
-        beyond_rows=n_beyond,
-        lost_rows=int(np.sum(~np.isfinite(brought).all(axis=1) & np.isfinite(kept_v).all(axis=1))),
+        has_lost=n_lost > 0,
+        lost_rows=n_lost,
         is_resampled=variance < FAITHFUL or rate[name] < rate[own] / FASTER,
         rate_ratio=rate["gyroscope"] / rate["accelerometer"],
-        rows_left_out=n_cut + n_beyond,
+        rows_left_out=len(base_t) - len(kept_t) + n_beyond,
     )
     readings: dict[str, Any] = {own: kept_v, name: brought}
     merged = replace(

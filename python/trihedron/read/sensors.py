@@ -193,7 +193,7 @@ def settled(sensors: Sensors) -> Sensors:
         return sensors
     counter = sensors.columns.counter
     numbers = None if counter is None else sensors.column(counter)
-    found = settle_clock(sensors.time_s, sensors.start_s, list(sensors.triads.values()), numbers)
+    found = settle_clock(sensors.time_s, sensors.start_s, sensors.triads, numbers)
     return replace(
         sensors,
         time_s=found.time_s,

@@ -1,5 +1,6 @@
 """Chooses the clock of a recording: its timestamps, or an even clock (docs/reading.md, section 4)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,9 +131,9 @@ class Settled:
 
 
 def settle_clock(
-    time_s: FloatArray, start_s: float, triads: list[FloatArray], counter: FloatArray | None = None
+    time_s: FloatArray, start_s: float, triads: Mapping[str, FloatArray], counter: FloatArray | None = None
 ) -> Settled:
-    """The clock of samples with timestamps (n,) and readings (n, 3) in each of ``triads``.
+    """The clock of samples with timestamps (n,) and readings (n, 3) in each of ``triads``, by name.
 
     Timestamps that samples share, and those of a rounded even clock, are replaced by the even clock unless the motion
     follows them; others only if the motion shows that sampling was even. A ``counter`` (n,) of samples shows losses.
@@ -152,7 +153,7 @@ def settle_clock(
     shared = steps_of(time_s).same / (len(time_s) - 1)
     is_even = False
     if clock.timestamp_error_s > _worth(clock.kind) * clock.period_s:
-        share, sigma = followed(time_s, clock.even_s, clock.tick, triads)
+        share, sigma = followed(time_s, clock.even_s, clock.tick, list(triads.values()))
         follows, ignores = _decided(share, sigma)
         by_itself = shared > SHARED or clock.kind is TimestampKind.ROUNDED
         is_even = not follows and (ignores or by_itself)
@@ -160,7 +161,7 @@ def settle_clock(
         clock.kind, clock.period_s, clock.sigma_period_s, clock.timestamp_error_s, is_even, clock.counts_losses,
         int(lost.sum()) if clock.counts_losses else 0, share, sigma,
     )  # fmt: skip
-    findings = _findings(sampling, clock, shared)
+    findings = _findings(sampling, clock, shared, tuple(triads))
     told = lost if clock.counts_losses else None
     if not is_even:
         return Settled(time_s, start_s, sampling, told, findings)
@@ -196,7 +197,7 @@ def sample_numbers(counter: FloatArray) -> IntArray | None:
     return np.concatenate([[0], np.cumsum(np.rint(step / usual))]).astype(np.int64)
 
 
-def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Finding, ...]:
+def _findings(sampling: Sampling, clock: EvenClock, shared: float, sensors: tuple[str, ...]) -> tuple[Finding, ...]:
     if sampling.timestamp_error_s <= _worth(sampling.kind) * sampling.period_s:
         return ()
     follows, ignores = _decided(sampling.followed, sampling.sigma_followed)
@@ -215,5 +216,7 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
             sigma_followed=sampling.sigma_followed,
             shared_fraction=shared,
             is_partly=follows,
+            is_of_one=len(sensors) == 1,
+            sensor=sensors[0].replace("gyroscope", "gyro") if sensors else "",
         ),
     )

@@ -182,9 +182,9 @@ def _settled(motion: ReferenceMotion, findings: tuple[Finding, ...]) -> Referenc
         findings = (*findings, Finding.of("columns-assumed", "commands", n_rows=len(time_s)))
     else:
         # Rows of the attitude matrix change with motion as readings do: two of them show when a row was taken.
-        triads = [] if attitude is None else [attitude[:, 0], attitude[:, 1]]
-        triads = triads if rate is None else [rate]
-        settled = settle_clock(time_s, start_s, [np.ascontiguousarray(t) for t in triads])
+        triads = {} if attitude is None else {"reference": attitude[:, 0], "its second row": attitude[:, 1]}
+        triads = triads if rate is None else {"reference": rate}
+        settled = settle_clock(time_s, start_s, {name: np.ascontiguousarray(t) for name, t in triads.items()})
         time_s, start_s = settled.time_s, settled.start_s
         findings = (*findings, *settled.findings)
     keep = np.concatenate([[True], np.diff(time_s) > SHORTEST_STEP * float(np.median(np.diff(time_s)))])

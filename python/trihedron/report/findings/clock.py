@@ -101,26 +101,27 @@ _RATES = {
     ),
 }
 
+_TIMESTAMPS_OF = "{is_of_one:?The {sensor}'s|The} timestamps"
 _EVEN = "of {rate_hz:.5g} Hz"
 _HOW = (
     "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {timestamp_error_s:.2g ms} rms, as they are when "
     "samples are timestamped on arrival|scattered by {timestamp_error_s:.2g ms} rms}}"
 )
 _BY_MOTION = (
-    "{motion_shows:?the readings in motion contain {followed:.2g %} ± {sigma_followed:.2g %} of that error "
+    "{motion_shows:?the readings in motion contain {followed:± sigma_followed %} of that error "
     "(0 %: sampled evenly, 100 %: sampled at the timestamps)|no motion shows when samples were taken}"
 )
 _LOG_COUNTER = "Log the sensor's own sample counter or data-ready times if turns matter."
 
 _CLOCKS = {
     ("even-clock", "", NOTE): Words(
-        f"The timestamps are {_HOW} about an even clock {_EVEN}, which was used: {_BY_MOTION}."
+        f"{_TIMESTAMPS_OF} are {_HOW} about an even clock {_EVEN}, which was used: {_BY_MOTION}."
     ),
     ("timestamps-kept", "", NOTE): Words(
-        f"The timestamps differ from an even clock {_EVEN} by {{timestamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
+        f"{_TIMESTAMPS_OF} differ from an even clock {_EVEN} by {{timestamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",
     ),
     ("clock-undecided", "", WARNING): Words(
-        f"The timestamps are {_HOW} about an even clock {_EVEN} and {_BY_MOTION}: {{is_partly:?both partly right, |}}"
+        f"{_TIMESTAMPS_OF} are {_HOW} about an even clock {_EVEN} and {_BY_MOTION}: {{is_partly:?both partly right, |}}"
         "the timestamps were kept.",
         "{is_partly:?Samples taken unevenly and timestamped inexactly.|A sensor that is sampled evenly and timestamped "
         "on arrival, or one that is sampled unevenly.}",
@@ -129,10 +130,10 @@ _CLOCKS = {
     ("clocks-merged", "same-timestamps", NOTE): Words("Both sensors have the same timestamps."),
     ("clocks-merged", "", NOTE): Words(
         "Two clocks merged: accelerometer {accelerometer_rate_hz:.5g} Hz, gyro {gyroscope_rate_hz:.5g} Hz, gyro starts "
-        "{offset_s:+.3g ms} after; the {base} keeps its samples, the {other} was taken at the same tick in "
+        "{offset_s:+.3f ms} after; the {base} keeps its samples, the {other} was taken at the same tick in "
         "{same_tick_fraction:.3g %} of rows and interpolated between neighbours elsewhere, which leaves "
-        "{variance_factor:.3g %} of its white-noise variance; {cut_rows} rows outside the overlap were cut, and "
-        "{beyond_rows} of the {other}'s, {lost_rows} rows in gaps of the {other} have no reading.",
+        "{variance_factor:.3g %} of its white-noise variance; outside the overlap {rows_left_out:# row} cut"
+        "{has_lost:?, in gaps of the {other} {lost_rows:# row} without its reading|}.",
         "Each sensor was logged with its own timestamps.",
         "{is_resampled:?For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated.|}",
         or_severity=WARNING,
