@@ -164,3 +164,12 @@ def test_every_phrase_of_a_stage_is_in_the_catalogue_with_its_places_and_every_p
     sources = [path for path in PACKAGE.rglob("*.py") if path.parent.name != "findings"]
     texts = "\n".join(path.read_text() for path in [*sources, *(PACKAGE.parents[1] / "rust").rglob("*.rs")])
     assert {phrase for phrase in PHRASES if f'"{phrase}"' not in texts} == set()
+
+
+def test_a_value_beside_its_uncertainty_has_the_digits_of_the_uncertainty():
+    place = "up to {rate:± sigma °/s} per g"
+    assert places(place) == {"rate", "sigma"}
+    # 0.16 alone would hide that the third digit is known.
+    assert (
+        filled(place, {"rate": np.radians(0.16), "sigma": np.radians(0.0047)}, {}) == "up to 0.1600 ± 0.0047 °/s per g"
+    )

@@ -46,7 +46,7 @@ def verification_report(
     caption += "uncertainty, judges them together; an rms can exceed the expected one by a single uncertain pose."
     sections = [
         Section("Result", (Facts(facts_of(verification)),)),
-        Section("Findings", (findings_block(verification.findings),)),
+        Section("Findings", (findings_block(sorted(v.findings, key=lambda one: one.code not in _ABOVE_NOISE)),)),
         Section("Parameters", (parameters_table(verification),)),
         Section("Poses and moves", tuple(_tables(verification, segments))),
     ]
@@ -179,7 +179,7 @@ def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
 
 def _bias_changes(v: Verification) -> list[str]:
     """Log minus file of the gyro's bias along X, Y, Z; empty without a gyro."""
-    biases = [one for one in v.parameters if one.id == "gyro-bias"]
+    biases = [one for one in v.parameters if one.id == "gyro-bias" and np.isfinite(one.sigma)]
     differences, sigmas = [-one.difference for one in biases], [one.sigma for one in biases]
     changed = each_with_sigma(differences, sigmas, degrees_from_radians(1.0))
     return [", ".join(changed)] if changed else []

@@ -97,11 +97,10 @@ ENTRIES = {
         or_severity=SERIOUS,
     ),
     ("residual-above-noise", "verify-static", WARNING): Words(
-        "The gravity error in static poses is {norm_rms_m_s2:.3g mm/s²} rms, {times:.2g} times what noise and "
-        "uncertainty allow{is_offset:?, with one sign in {n_same} of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average "
-        "({share:.2g %} of gravity)|}; largest for its uncertainty in pose "
-        "{worst_pose} ({worst_m_s2:.3g mm/s²}){is_single:?, without which they are as expected|}, χ²/dof "
-        "{chi2_per_dof:.2g} with each pose weighted by its uncertainty.",
+        "The gravity error in static poses is {norm_rms_m_s2:.3g mm/s²} rms and, with each pose weighted by its "
+        "uncertainty, {times:.2g} times what noise and uncertainty allow{is_offset:?, with one sign in {n_same} "
+        "of {n_poses} poses, {mean_m_s2:.3g mm/s²} on average ({share:.2g %} of gravity)|}; largest for its "
+        "uncertainty in pose {worst_pose} ({worst_m_s2:.3g mm/s²}){is_single:?, without which they are as expected|}.",
         "{is_single:?The sensor {is_first:?was still warming up|moved} or was touched in pose {worst_pose}|"
         "{is_bias:?Biases have changed since, scales and axes have not (warm-up, temperature, shock)|{is_few:?In the "
         "file, or in the sensor since, {shifted:ids} changed: nothing else differs from this log's own calibration|"

@@ -55,8 +55,8 @@ _MOVES = {
         "right).",
         "A wrong unit; or, if the unit is right, each time interval lasts {scale_ratio:.4g} times as long as it was "
         "read.",
-        "{has_fitting:?Read it with --gyro-unit {fitting}; or|Check the clock:} with `--columns time=none --rate "
-        "{right_hz:.3g}` the scale is 1.",
+        "{has_fitting:?Read it with --gyro-unit {fitting}; or with|With} `--columns time=none --rate {right_hz:.3g}` "
+        "the scale is 1{has_fitting:?|; if that is no possible rate, read it with --gyro-unit counts}.",
     ),
     ("scale-not-nominal", "gyro-common", WARNING): Words(
         "all three gyro scales are {excess:+.2g %} off in {unit:unit}; they agree within {spread:.1g %} (1 σ), and "
@@ -117,8 +117,8 @@ _MOVES = {
         "Repeat the moves with lost samples, at a rate that the link sustains.",
     ),
     ("gyro-g-sensitivity", "", NOTE): Words(
-        "the gyro's bias follows gravity, as by g-sensitivity, up to {per_g_rad_s:.2g !°/s} ± {sigma_per_g_rad_s:.1g "
-        "°/s} per g ({rate_axis:axis} for force along {force_axis:axis}). S and b are those beside it and alone cannot "
+        "the gyro's bias follows gravity, as by g-sensitivity, up to {per_g_rad_s:± sigma_per_g_rad_s °/s} "
+        "per g ({rate_axis:axis} for force along {force_axis:axis}). S and b are those beside it and alone cannot "
         "correct it.",
         "{may_be_earth:?the rotation of the Earth ({earth_rad_s:.2g °/s}), or |}g-sensitivity of the gyro.",
         "Separate g-sensitivity from a bias that differs from pose to pose: `trihedron diagnose LOG`; --extended fits "
@@ -155,7 +155,7 @@ _MOVES = {
     ),
     ("samples-lost", "seen-in-motion", WARNING): Words(
         "Samples are missing though the timestamps run on evenly: the motion jumps across {losses} of {joints} "
-        "intervals that would show it (first at {first_s:.2f} s): about {lost_share:.2g !%} ± {sigma_lost_share:.1g %} "
+        "intervals that would show it (first at {first_s:.2f} s): about {lost_share:± sigma_lost_share %} "
         "of the samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
         "A link or a logger that drops samples and renumbers the others, or timestamps them anew.",
         "Lower the rate or the load of the link and record again; or put single losses back by a fit with effects: "
@@ -191,9 +191,9 @@ _MOVES = {
         "Record again, or log at a rate that the link sustains.",
     ),
     ("static-rate-above-noise", "", WARNING): Words(
-        "The gyro rate in static poses changes from pose to pose by {rate_rms_rad_s:.2g °/s} rms, {times:.2g} times "
-        "what noise and the bias drift of the calibration allow; largest in pose {worst_pose} "
-        "({axis:axis} {worst_rad_s:.2g °/s}), χ²/dof {chi2_per_dof:.2g}{is_by_gravity:?. It goes with gravity, by up "
+        "The gyro rate in static poses changes from pose to pose by {rate_rms_rad_s:.2g °/s} rms and, with each pose "
+        "weighted by its uncertainty, {times:.2g} times what noise and the bias drift of the calibration allow; "
+        "largest in pose {worst_pose} ({axis:axis} {worst_rad_s:.2g °/s}){is_by_gravity:?. It goes with gravity, by up "
         "to {per_g_rad_s:.2g °/s} per g|}.",
         "{is_by_gravity:?G-sensitivity of the gyro, which S and b cannot correct|The bias drifts in this log more than "
         "in the one that was calibrated (warm-up, temperature)}.",
@@ -203,10 +203,10 @@ _MOVES = {
         or_severity=SERIOUS,
     ),
     ("held-out-worse", "verify-moves", WARNING): Words(
-        "The tilt error after rotations is {angle_rms_deg:.3g}° rms, {times:.2g} times what noise and uncertainty allow"
-        "; largest for its uncertainty in move {worst_move} ({worst_deg:.3g}°){is_beside:?, beside the unsteady pose "
-        "{unsteady:first 2}|}{is_single:?, without which they are as expected|}, χ²/dof {chi2_per_dof:.2g} with each "
-        "move weighted by its uncertainty.",
+        "The tilt error after rotations is {angle_rms_deg:.3g}° rms and, with each move weighted by its uncertainty, "
+        "{times:.2g} times what noise and uncertainty allow; largest for its uncertainty in move {worst_move} "
+        "({worst_deg:.3g}°){is_beside:?, beside the unsteady pose {unsteady:first 2}|}"
+        "{is_single:?, without which they are as expected|}.",
         "{is_single:?The gyro clipped, samples were lost, or a pose beside move {worst_move} was not static|"
         "{is_common:?All gyro scales differ by one factor ({common:+.2g %}): the clock or the rate of one of the two "
         "logs is off by it, or the gyro's sensitivity has changed; the log alone does not say which|"

@@ -4,6 +4,7 @@ A placeholder is a name and, after the colon, the format of its value:
 
 ``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
                          ``.3g !%`` without the unit's name
+``± sigma %``            the value and its σ of that name, in that unit (optional): ``0.160 ± 0.005 °/s``
 ``quantity``             value, its σ where known, and unit: ``1.41 mm/s²``, ``0.0069 ± 0.0012 °/s``
 ``all .2g °/s``          several numbers in one unit, which is printed once: ``0.1, 0.2 °/s``
 ``# pose``               ``1 pose``, ``3 poses``
@@ -56,6 +57,7 @@ def places(template: str) -> frozenset[str]:
     for _, name, how, _ in Formatter().parse(template):
         if name:
             found |= {name} | (places(how[1:]) if how and how[0] in BRANCHES else frozenset())
+            found |= {how.split()[1]} if how and how.startswith("± ") else set()
     return frozenset(found)
 
 
@@ -73,6 +75,9 @@ def filled(template: str, values: Mapping[str, Any], lines: Mapping[str, str]) -
         if name:
             if how and how[0] in BRANCHES:
                 words.append(_chosen(values, name, how, lines))
+            elif how and how.startswith("± "):
+                sigma, _, unit = how[2:].partition(" ")
+                words.append(_with_sigma(values[name], values[sigma], unit))
             else:
                 words.append(_in_words(values[name], how or "", lines.get(name, "")))
     return "".join(words)
@@ -158,6 +163,11 @@ def _number(value: float, how: str) -> str:
     if unit.startswith("!"):
         return _digits(UNITS[unit[1:]](value), digits)
     return with_unit(_digits(UNITS[unit](value), digits), "°" if unit == "deg" else unit)
+
+
+def _with_sigma(value: float, sigma: float, unit: str) -> str:
+    """Both in the unit, the digits of the value by σ."""
+    return with_unit(with_sigma(UNITS[unit](value), UNITS[unit](sigma)), unit)
 
 
 def _digits(value: float, digits: str) -> str:
