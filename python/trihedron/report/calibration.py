@@ -196,7 +196,7 @@ def _result(
     strong = strong_correlations(calibration)
     if strong:
         pairs = ", ".join(f"{a} and {b} {plain_number(r, 2)}" for a, b, r in strong[:MOST_PAIRS])
-        pairs += f"; {len(strong) - MOST_PAIRS} more in the whole report" if len(strong) > MOST_PAIRS else ""
+        pairs += f"; {len(strong) - MOST_PAIRS} more" if len(strong) > MOST_PAIRS else ""
         blocks.append(Facts((("correlations above 0.5", pairs),)))
     return tuple(blocks)
 

@@ -1,18 +1,20 @@
 """A diagnosis in tables: S and b without and with the effects, every effect that was tried, empirical relations."""
 
+import numpy as np
+
 from trihedron.arrays import AXES
 from trihedron.records.diagnosis import Diagnosis, Relation
+from trihedron.report.calibration import shared_power
 from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
 from trihedron.report.names import id_in_print, ids_in_print, variable_in_print
 from trihedron.report.numbers import (
     MINUS,
-    engineering_exponent,
     listed,
     one_of,
     plain_number,
-    power_of_ten,
     unit_in_print,
+    with_sigma,
 )
 
 MOST_COEFFICIENTS = 6
@@ -26,13 +28,17 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             continue
         # Without an effect both models are equal.
         models = (before, after) if diagnosis.effects else (before,)
+        scale, times = shared_power(np.asarray(before["S"]))
         rows = [
-            (f"S_{AXES[i]}{AXES[j]}", *(_cell(model, "S", (i, j)) for model in models))
+            (
+                f"S_{AXES[i]}{AXES[j]}{times}",
+                *(with_sigma(scale * m["S"][i][j], scale * m["sigma_S"][i][j]) for m in models),
+            )
             for i in range(3)
             for j in range(3)
             if before["sigma_S"][i][j] > 0.0
         ]
-        rows += [(f"b_{AXES[i]}", *(_cell(model, "b", (i,)) for model in models)) for i in range(3)]
+        rows += [(f"b_{AXES[i]}", *(with_sigma(m["b"][i], m["sigma_b"][i]) for m in models)) for i in range(3)]
         head = ("", "linear model", "with the effects")[: 1 + len(models)]
         raw, si = unit_in_print(before["raw_unit"]), "m/s²" if name == "accelerometer" else "rad/s"
         of_S = "dimensionless" if raw == si else f"in {si} per {one_of(raw)}"
@@ -57,17 +63,6 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             facts.append((f"{name} bias", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
-
-
-def _cell(model: object, key: str, place: tuple[int, ...]) -> str:
-    value, sigma = model[key], model["sigma_" + key]  # type: ignore[index]
-    for k in place:
-        value, sigma = value[k], sigma[k]
-    exponent = engineering_exponent(max(abs(value), sigma))
-    if sigma <= 0.0 or -3 < exponent <= 3:
-        return value_in_words(value, sigma)
-    scale = 10.0**-exponent
-    return f"({value_in_words(scale * value, scale * sigma)}) {power_of_ten(exponent)}"
 
 
 def candidates_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:

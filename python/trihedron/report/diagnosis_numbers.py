@@ -31,7 +31,6 @@ LOGS = (".csv", ".npz", ".parquet")
 _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
-_DEFINED = f"a bias is {BIAS}; {TRIAD}; a scale without unit is dimensionless (readings in SI)"
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
 
 
@@ -71,7 +70,7 @@ def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         return (Paragraph("None of the given parameters differs beyond both uncertainties and bias drift."),)
     blocks: list[Block] = []
     if rows:
-        blocks.append(Table(_HEAD, rows, f"Parameters of the groups that differ; {_DEFINED}"))
+        blocks.append(Table(_HEAD, rows, f"Parameters of the groups that differ; {_defined(diagnosis)}"))
     if sentences:
         blocks.append(Facts(tuple(("", one) for one in sentences)))
     return tuple(blocks)
@@ -157,7 +156,18 @@ def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     agreeing = sorted((p for p in diagnosis.parameters if not p.significant), key=lambda p: (p.p_value, p.id))
     if not agreeing:
         return ()
-    return (Table(_HEAD, tuple(map(_row, agreeing)), f"Parameters of the groups that agree; {_DEFINED}"),)
+    return (Table(_HEAD, tuple(map(_row, agreeing)), f"Parameters of the groups that agree; {_defined(diagnosis)}"),)
+
+
+def _defined(diagnosis: Diagnosis) -> str:
+    """Sign of a bias, meaning of the triad alignment, unit of the scales of each sensor."""
+    sensors = (
+        ("accelerometer", "m/s²", diagnosis.baseline.accelerometer),
+        ("gyro", "rad/s", diagnosis.baseline.gyroscope),
+    )
+    raws = [(name, si, unit_in_print(model["raw_unit"])) for name, si, model in sensors if model is not None]
+    units = [f"{name} scale {'dimensionless' if raw == si else f'in {raw} per {si}'}" for name, si, raw in raws]
+    return f"a bias is {BIAS}; {TRIAD}; {', '.join(units)}"
 
 
 def _row(p: ParameterDifference) -> tuple[str, ...]:
@@ -200,7 +210,10 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
         return (Paragraph("No stages: the model was fitted to this recording."),)
     kept = {stage.stage for stage in stages}
     same = [stage.stage for stage in diagnosis.stages if stage.stage not in kept]
-    caption = "Cross-validated rms after each stage, predictive χ²/dof (1 by noise and uncertainty alone) in brackets"
+    caption = (
+        "Cross-validated rms after each stage, in brackets predictive χ²/dof by the noise that each stage's own model "
+    )
+    caption += "needs (1 by it and uncertainty alone)"
     caption += f"; stages without change: {', '.join(same)}" if same else ""
     unchanged = [size.get(d, d) for d in units if d not in changed]
     caption += f"; the same in every stage: {', '.join(unchanged)}" if unchanged else ""
