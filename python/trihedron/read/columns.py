@@ -291,7 +291,7 @@ def _without_sensor(table: Table) -> str:
     listed = ", ".join(table.names) if table.names else f"{len(table.columns)} columns without names"
     return (
         f"no accelerometer and no gyro columns recognised among: {listed[:300]}; "
-        "name them, for example --columns time=1,ax=2,ay=3,az=4."
+        "name them, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
     )
 
 

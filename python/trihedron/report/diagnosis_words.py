@@ -40,8 +40,8 @@ MOSTLY = 0.5
 MOST_NAMED = 4
 IN_FULL = ("axis-handedness",)
 """Effects whose statement names what is wrong in the log: a verdict states it."""
-STATED = (*IN_FULL, "disturbed-pose", "dropped-samples")
-"""Effects that a verdict states by their statement: it says where in the log."""
+STATED = (*IN_FULL, "disturbed-pose", "dropped-samples", "earth-rate")
+"""Effects that a verdict states by their statement: it says where in the log, or that the log lacks them."""
 NOT_JUDGED = "not judged"
 LACKS = "lacks effect"
 OF_SAMPLES = ("within-static", "timing", "rate")
