@@ -44,12 +44,17 @@ def filled(step):
     ("notes", "step", "said"),
     [
         (
-            [(now.note_file, "cal.json")],
+            [(now.note_file, Path("cal.json"))],
             "`trihedron verify FILE OTHER_LOG`; `trihedron apply FILE LOG`.",
             f"`trihedron verify cal.json OTHER_LOG`; `trihedron apply cal.json {MY_LOG}`.",
         ),
         # One of several logs by its name is read as it was.
         ([], "`trihedron diagnose 'my log.csv'`", f"`trihedron diagnose {MY_LOG} --latitude 59.9`"),
+        (
+            [(now.note_log, LogSource(accel=Path("a.csv"), gyro=Path("g.csv"), rate=50.0))],
+            "`trihedron diagnose --accel a.csv --gyro g.csv`",
+            "`trihedron diagnose --accel a.csv --gyro g.csv --rate 50 --latitude 59.9`",
+        ),
         # The place and a reference go to commands that take them.
         (
             [(now.note_reference, "motion.csv")],
@@ -59,8 +64,8 @@ def filled(step):
     ],
 )
 def test_a_command_of_the_next_step_names_what_was_given_where_it_is_taken(notes, step, said):
-    for note, name in notes:
-        note(Path(name))
+    for note, given in notes:
+        note(given)
     assert filled(step) == said
 
 

@@ -22,7 +22,7 @@ _OF_ITS_COMMAND = ("--alpha", "--by", "--labels", "--frame")
 _WITHOUT_VALUE = ("--full", "--force")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
-_NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--))")
+_NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--(?!accel |gyro |instance )))")
 """A command with one of several logs by its name: this place is also its own."""
 UNSTORED = "calibration.json"
 LONG = 100
@@ -175,7 +175,8 @@ def _filled(command: str) -> str:
     given = [word for word in _now().typed if word not in _now().excluded]
     if verb in _WITH_PLACE and _NAMES_A_LOG.search(command):
         named = shlex.split(command.strip("`"))[2:]
-        options = next((shlex.join(words[len(named) :]) for words in _now().logs if words[: len(named)] == named), "")
+        read = next((words for words in _now().logs if {*named} <= {*words}), [])
+        options = shlex.join(word for word in read if word not in named)
         return f"`{' '.join(filter(None, (command.strip('`'), options, _now().place)))}`"
     is_own = any(word in _OF_ITS_COMMAND for word in given)
     if re.fullmatch(r"`trihedron \w+ \.\.\.`", command) and len(again(given)) > LONG and not is_own:

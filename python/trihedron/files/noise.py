@@ -52,8 +52,8 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
         ) from None
     if not out:
         raise NoiseFileError(
-            f"{source}: its noise is in counts; run `trihedron allan LOG` again with --accel-lsb and "
-            "--gyro-lsb, or with --calibration FILE."
+            f"{source}: its noise is in counts; make it again with --accel-lsb and --gyro-lsb, or with "
+            "--calibration FILE."
         )
     return out, rate
 

@@ -25,7 +25,7 @@ MEANING = {
 """Parameters and domains of residuals in words."""
 FINDINGS = {
     "accelerometer-nominal": "accelerometer not calibrated",
-    "calibration-doubted": "warnings by themselves",
+    "calibration-doubted": "warnings of single recordings",
     "calibration-imprecise": "errors larger than by the log's own calibration",
     "calibration-shift": "parameters differ",
     "effect-not-applied": "effect not compensated",
