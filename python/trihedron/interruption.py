@@ -17,6 +17,8 @@ GRACE_S = 0.5
 """Time for a command to end in order [s]; the total stays below a second."""
 SENTENCE = "interrupted; what was not finished was not written."
 _NUMBERS = (signal.SIGINT, signal.SIGTERM)
+SAID = threading.Event()
+"""Set where the command itself has printed the sentence: ending the process late does not repeat it."""
 
 
 class Interrupted(BaseException):
@@ -76,6 +78,6 @@ def end_now(status: int) -> None:
         temporary.remove_unfinished()
     shown = "\x1b[?25h\r\x1b[K" if os.isatty(2) else ""
     try:
-        os.write(2, f"{shown}trihedron: {SENTENCE}\n".encode())
+        os.write(2, (shown + ("" if SAID.is_set() else f"trihedron: {SENTENCE}\n")).encode())
     finally:
         os._exit(status)

@@ -21,7 +21,7 @@ from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.output import say, silence, spell_out
 from trihedron.cli.run import begin, with_commands
 from trihedron.errors import InputError
-from trihedron.interruption import SENTENCE, Interrupted, status_of
+from trihedron.interruption import SAID, SENTENCE, Interrupted, status_of
 
 # In the order in which they are used.
 _NAMES = (
@@ -84,10 +84,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         if status == _INTERRUPTED:
             # Typer handled the Ctrl-C itself.
-            _reject(SENTENCE)
+            _interrupted()
         return int(status or 0)
     except (typer.Abort, Interrupted, KeyboardInterrupt) as error:
-        _reject(SENTENCE)
+        _interrupted()
         return status_of(error)
     except (BrokenPipeError, SystemExit) as error:
         # The reader closed the pipe (`| head`), which is no error. Where that happens inside a command, typer raises
@@ -185,6 +185,11 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
         message = f"{wrong[1]} takes {kind}{f', not {given!r}' if given else ''}"
     stop = "" if message.endswith(("?", ".")) else "."
     return f"{message}{stop} `{where}` lists what there is."
+
+
+def _interrupted() -> None:
+    SAID.set()
+    _reject(SENTENCE)
 
 
 def _reject(sentence: str) -> int:
