@@ -12,7 +12,7 @@ from trihedron.cli import run as now
 from trihedron.cli.options import GravitySource, LogSource
 from trihedron.records import Finding, Severity
 from trihedron.report.diagnosis_next_step import next_step_in_words
-from trihedron.report.document import Document
+from trihedron.report.document import Document, FindingList, Section
 
 MY_LOG = "'my log.csv' --rate 50"
 DISAGREES = SimpleNamespace(domain="moves", disagrees=True)
@@ -153,3 +153,13 @@ def test_a_calibration_less_certain_than_that_of_the_log_is_replaced_though_its_
     for findings, is_kept in (((), True), ((imprecise,), False)):
         found = SimpleNamespace(verdict="consistent", parameters=(agrees,), findings=findings)
         assert next_step_in_words(found, "cal.json").startswith("Keep using cal.json") == is_kept
+
+
+@pytest.mark.parametrize(
+    ("own_level", "first"), [("usable", "Check the sensor."), (None, "Use a firm support. Then: ")]
+)
+def test_the_next_step_of_a_verdict_of_its_own_answers_it_and_not_a_warning(own_level, first):
+    shaken = Finding("pose-unsteady", Severity.WARNING, "Seen.", "", "Use a firm support.")
+    sections = (Section("Findings", (FindingList((shaken,)),)),)
+    document = Document("", "", "Other.", True, sections, stated_level=own_level, next_step="Check the sensor.")
+    assert document.what_next.startswith(first)

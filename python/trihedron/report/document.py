@@ -159,9 +159,12 @@ class Document:
 
     @property
     def what_next(self) -> str:
-        """The action of a serious finding; that of a warning before ``next_step``."""
+        """The action of a serious finding; that of a warning before ``next_step``, unless that answers a verdict which
+        is the document's own (of a diagnosis)."""
         first, then = self.foremost, self.next_step
         if first is None or not first.action or begins_with(then, first.action) or first.action in then:
+            return then
+        if then and first.severity is Severity.WARNING and self.stated_level in _WRONG:
             return then
         action = action_in_words(first)
         own, first_step = _COMMAND.search(action), _COMMAND.search(then.partition(".")[0])
