@@ -10,6 +10,7 @@ import pickle
 import re
 import traceback
 import types
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -214,7 +215,9 @@ def results(recording, result):
         "simulate": trihedron.simulate("six-faces", 4),
         "segment": result.segments,
         "calibrate": result,
-        "sessions": trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665),
+        "sessions": trihedron.calibrate_sessions(
+            [recording, replace(recording, sha256="another")], gravity_m_s2=9.80665
+        ),
         "verify": trihedron.verify(result, recording),
         "check": trihedron.check(rest),
         "diagnose": trihedron.diagnose(recording, gravity_m_s2=9.80665),
