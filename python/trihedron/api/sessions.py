@@ -74,7 +74,8 @@ def calibrate_sessions(
 
     Examples
     --------
-    >>> model = trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665)
+    >>> other, _ = trihedron.simulate("hand-session", 4)
+    >>> model = trihedron.calibrate_sessions([recording, other], gravity_m_s2=9.80665)
     >>> len(model.model.sessions)
     2
     """

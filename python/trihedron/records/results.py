@@ -253,7 +253,8 @@ class SessionsResult(Printed):
 
     Examples
     --------
-    >>> both = trihedron.calibrate_sessions([recording, recording], gravity_m_s2=9.80665)
+    >>> other, _ = trihedron.simulate("hand-session", 4)
+    >>> both = trihedron.calibrate_sessions([recording, other], gravity_m_s2=9.80665)
     >>> len(both.results)
     2
     """
