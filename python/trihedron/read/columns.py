@@ -12,6 +12,7 @@ from trihedron.read.clock.unit import TICKS
 from trihedron.read.errors import ReadError
 from trihedron.read.names import ColumnName, parse_name
 from trihedron.read.table import Table
+from trihedron.read.unnamed import are_nanoseconds, by_values
 from trihedron.records import Finding
 
 Sensor = Literal["accelerometer", "gyroscope"]
@@ -169,7 +170,7 @@ def _column_number(table: Table, text: str, role: str) -> int:
 
 
 def _by_place(table: Table, known: Meanings, sensor: Sensor | None, findings: list[Finding]) -> Meanings:
-    """Columns without names in the usual order for their number; none where others have names that mean nothing."""
+    """Columns without names by their number, else by their values; none where others have names that mean nothing."""
     filled = [
         i
         for i, column in enumerate(table.columns)
@@ -179,9 +180,11 @@ def _by_place(table: Table, known: Meanings, sensor: Sensor | None, findings: li
     while filled and len(filled) not in _BY_PLACE and not np.isfinite(table.columns[filled[-1]]).any():
         filled.pop()
     n = len(filled)
-    if n not in _BY_PLACE and table.names is not None:
-        return {}
-    if n not in _BY_PLACE:
+    if n not in _BY_PLACE or table.sensor is not None:
+        found, said = by_values(table, filled, next((i for i, one in known.items() if one.role == "time"), None))
+        findings += said
+        if found or table.names is not None:
+            return found
         raise ReadError(
             f"{table.path}: {n} columns without names could mean anything; "
             "name them, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
@@ -253,7 +256,7 @@ def _clock_columns(table: Table, meanings: Meanings, said: Meanings, mapping: st
     # A program may write an empty column for a clock that it does not have.
     times = [i for i, m in meanings.items() if m.role == "time" and (i in said or np.isfinite(table.columns[i]).any())]
     time = max(times, key=lambda i: (meanings[i].rank, -i), default=None)
-    found: dict[str, Any] = {"nanoseconds": _nanoseconds_beside(table.names or (), time)}
+    found: dict[str, Any] = {"nanoseconds": _nanoseconds_beside(table, time)}
     unit = "" if time is None else meanings[time].time_unit
     if unit in ("", TICKS):
         unit = table.metadata.get("time unit", unit)
@@ -267,9 +270,11 @@ def _clock_columns(table: Table, meanings: Meanings, said: Meanings, mapping: st
     return found | {"time": None if is_ignored else time, "time_unit": unit}
 
 
-def _nanoseconds_beside(names: tuple[str, ...], time: int | None) -> int | None:
-    """The column of nanoseconds that belongs to a time column of seconds, as ROS names them (``nsecs``, ``secs``)."""
-    plain = [re.sub(r"\s*[\[(].*", "", name.strip().lower()) for name in names]
+def _nanoseconds_beside(table: Table, time: int | None) -> int | None:
+    """The nanoseconds of a time column of seconds, as ROS names them (``nsecs``, ``secs``), or behind it unnamed."""
+    if table.names is None and time is not None and time + 1 < len(table.columns):
+        return time + 1 if are_nanoseconds(table.columns[time], table.columns[time + 1]) else None
+    plain = [re.sub(r"\s*[\[(].*", "", name.strip().lower()) for name in table.names or ()]
     stem = re.fullmatch(r"(.*?)secs?", plain[time]) if time is not None and plain else None
     wanted = {f"{stem[1]}{word}" for word in ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")} if stem else set()
     return next((i for i, name in enumerate(plain) if name in wanted), None)
@@ -288,7 +293,8 @@ def _without_sensor(table: Table) -> str:
                 f"column '{name}' of the {role} contains no numbers{example}; correct it, or name another column, for "
                 "example --columns time=1,ax=2,ay=3,az=4."
             )
-    listed = ", ".join(table.names) if table.names else f"{len(table.columns)} columns without names"
+    named = [name for name in table.names or () if name]
+    listed = ", ".join(named) or f"{len(table.columns)} columns without names"
     return (
         f"no accelerometer and no gyro columns recognised among: {listed[:300]}; "
         "name them, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."

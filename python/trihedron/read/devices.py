@@ -82,13 +82,16 @@ _LETTERS = {"a": "accelerometer", "g": "gyroscope", "w": "gyroscope", "m": "magn
 """Sensors of records named by a letter, used only where all records are: letters may also name devices A, B, ..."""
 
 
+_RATHER = ("uncal", "total")
+
+
 def pick_kind(words: list[str], kind: str) -> str | None:
-    """The record name to use for a sensor; uncorrected readings are preferred to corrected ones."""
+    """The record name to use for a sensor; uncorrected readings, and those with gravity, are preferred."""
     fitting = [word for word in words if sensor_said(word) == kind]
     letters = [word.strip("$:").lower() for word in words]
     if not fitting and set(letters) <= _LETTERS.keys():
         fitting = [word for word, letter in zip(words, letters, strict=True) if _LETTERS[letter] == kind]
-    return max(fitting, key=lambda w: ("uncal" in w.lower(), -words.index(w)), default=None)
+    return max(fitting, key=lambda w: (*(said in w.lower() for said in _RATHER), -words.index(w)), default=None)
 
 
 def one_device(table: Table, options: Options, chosen_columns: Columns) -> Table:

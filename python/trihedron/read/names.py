@@ -66,6 +66,12 @@ _COUNTS = frozenset({"lsb", "digit", "digits", "count", "counts"})
 """Words for counts; mg/LSB is the LSB, not a unit of the readings."""
 _RATES = {"p": "x", "q": "y", "r": "z"}
 """Names of angular rates in aeronautics, and their axes."""
+_TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
+_SPEEDS = frozenset({"rate", "velocity", "vel", "speed", "gyro", "gyr", "gyroscope"})
+"""Words by which a column of roll, pitch or yaw is a rate, not an angle."""
+_SAYS_SENSOR = frozenset({"deg/s", "mdeg/s", "rad/s", "mrad/s", "m/s^2"})
+_SAYS_ANGLE = frozenset({"deg", "rad", "°"})
+"""Units that state the sensor of a column with an unknown name, and what is spelled so without a rate."""
 # The last two are the clock of GNSS receivers.
 _TIME_WORDS = {"t", "time", "epoc", "chiptime", "timestamp", "timestamps", "ts", "stamp", "elapsed", "epoch", "clock"}
 _TIME_WORDS |= {"when", "datetime", "uptime", "tow", "itow"}
@@ -76,6 +82,7 @@ _STEP_WORDS = {"dt", "deltat", "deltatime", "timedelta"}
 """Words for the time since the previous row."""
 _RATE_WORDS = {"rate", "frequency", "freq", "odr", "fs"}
 _OF_RATES = {"sampling", "sample", "sensor", "output", "data", "update", "log", "logging", "imu", "nominal", "hz"}
+_OF_RATES |= {"measurement"}
 """Words that may accompany the word for a rate; others mean another rate, such as a baud rate or an i2c frequency."""
 _OF_CLOCKS = {"1", "unit", "units", "resolution", "size", "period", "frequency"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
@@ -86,11 +93,11 @@ _UNITS = {
     "time": {
         "s": "s sec secs second seconds stime",
         "ms": "ms msec msecs millis milliseconds millisecond mstime cts",
-        "us": "us µs usec micros microseconds microsecond ustime",
+        "us": "us µs usec micros microseconds microsecond ustime utime",
         "ns": "ns nsec nanos nanoseconds nanosecond nanosec nstime",
     },
     "accelerometer": {
-        "m/s^2": "si ms2 mss mps2 mpers2 msec2 ms-2 m/s2 m/s/s mpss",
+        "m/s^2": "si ms2 mss mps2 mpss",
         "g": "g g0 gn gs gee gees",
         "mg": "mg millig mgee",
         "cm/s^2": "cms2 gal",
@@ -98,11 +105,11 @@ _UNITS = {
         "raw": "raw",
     },
     "gyroscope": {
-        "mdeg/s": "mdps mdegs mdegsec mdegps",
-        "rad/s": "si rads radss radsec rad rads-1 radps radpersec",
+        "mdeg/s": "mdps mdegs mdegps",
+        "rad/s": "si rads rad radps",
         "mrad/s": "mrads mrad mradps",
-        "deg/s": "dps degs deg degsec degps °s ° degs-1 °s-1",
-        "deg/h": "dph degh deghr degphr °h °hr degperhour",
+        "deg/s": "dps degs deg degps °s °",
+        "deg/h": "dph degh degph °h",
         "rpm": "rpm revmin rmin",
         "counts": "adc counts count lsb ticks digits int16 v mv volt volts",
         "raw": "raw",
@@ -112,12 +119,22 @@ _UNIT_OF = {
     sensor: {word: unit for unit, words in table.items() for word in words.split()} for sensor, table in _UNITS.items()
 }
 _TIME_UNIT_OF = _UNIT_OF.pop("time")
+_SHORT = tuple(
+    (re.compile(word), symbol)
+    for word, symbol in (
+        ("squared", "2"), ("radians?", "rad"), ("degrees?", "deg"), ("met(er|re)s?", "m"), ("milli", "m"),
+        ("sec(ond)?s?(?=2?$)", "s"), ("h(ou)?rs?$", "h"), ("per(?=s|h)", ""),
+    )
+)  # fmt: skip
+"""Words of units, and their symbols."""
 _RANKS = (
     ({"measured", "raw", "uncalibrated", "uncalib", "uncal", "unbiased"}, 2),
     ({"unfilt", "unfiltered"}, 1),
+    ({"rotation", "rot"}, -1),
     ({"user", "free", "linear", "linacc", "filtered", "lp", "smooth", "output"}, -2),
 )
-"""Words by which one of several triads is preferred: uncorrected readings, and those with gravity."""
+"""Words by which one of several triads is preferred: uncorrected readings, those with gravity, and rates (a rotation
+may be a vector of angles)."""
 
 
 @dataclass(frozen=True)
@@ -146,11 +163,19 @@ def _unit(sensor: str, words: list[str]) -> str:
     found = [""]
     for length in (4, 3, 2, 1):
         for start in range(len(words) - length + 1):
-            joined = "".join(words[start : start + length]).replace("milli", "m")
+            joined = _symbol(words[start : start + length])
             if joined in table and not set(words[start + length : start + length + 1]) & _OTHER_TIMES:
                 found.append(table[joined])
     # gyroADC [dps]: where a name contains "ADC" and another unit, the latter is the unit.
     return next((unit for unit in found[1:] if unit not in ("counts", "raw")), found[min(len(found) - 1, 1)])
+
+
+def _symbol(words: list[str]) -> str:
+    """The symbol of a unit in words, without signs between them: ``radians per second`` is ``rads``."""
+    text = "".join(words)
+    for word, by in _SHORT:
+        text = word.sub(by, text)
+    return text
 
 
 def _of_unit(text: str) -> list[str]:
@@ -176,7 +201,7 @@ def unit_said(sensor: str, text: str) -> str:
 
 def known_unit(sensor: str, text: str) -> str:
     """The sensor's unit that a text spells, as named in the records; ``raw`` for raw readings; "" where unknown."""
-    return _UNIT_OF[sensor].get("".join(_of_unit(plain(text).strip().lower())).replace("milli", "m"), "")
+    return _UNIT_OF[sensor].get(_symbol(_of_unit(plain(text).strip().lower())), "")
 
 
 def clock_said(what: str, unit: str) -> str:
@@ -191,7 +216,7 @@ def clock_said(what: str, unit: str) -> str:
 
 def is_rate(text: str) -> bool:
     """Whether a remark's key names the sampling rate and nothing else: ``Sample rate``, ``ODR``, ``fs [Hz]``."""
-    words = _WORD.findall(text.lower())
+    words = _WORD.findall(_CAMEL.sub(r"\1 \2", text).lower())
     return not _RATE_WORDS.isdisjoint(words) and all(w in _RATE_WORDS or w in _OF_RATES for w in words)
 
 
@@ -223,9 +248,9 @@ def _classify(words: list[str], unit_words: list[str]) -> ColumnName:
     single = _single_role(words, unit_words)
     if single is not None:
         return single
-    if words[0] in _RATES and (len(words) == 1 or _unit("gyroscope", words[1:])):
-        unit = _unit("gyroscope", unit_words) or _unit("gyroscope", words[1:])
-        return ColumnName("gyroscope", _RATES[words[0]], "p q r", unit, rank=-1)
+    about = _about_axis(words, unit_words)
+    if about is not None:
+        return about
     text = " ".join(words)
     apart = (found for pattern, by in _GLUED if (found := pattern.sub(by, text, count=1)) != text)
     rest = [word for word in next(apart, text).split() if word != "axis" or len(words) == 1]
@@ -240,11 +265,31 @@ def _classify(words: list[str], unit_words: list[str]) -> ColumnName:
         left = left[1:]
     key = " ".join(rest) + "|" + " ".join(unit_words)
     if not sensor:
+        if not rest and "".join(unit_words) in _TIME_UNIT_OF:
+            return ColumnName("time", time_unit=_TIME_UNIT_OF["".join(unit_words)])  # X[s]: Delsys' clock of a channel
         is_unit = bool(rest) and any("".join(rest) in table for table in _UNIT_OF.values())
+        by_unit = [(one, unit) for one in _UNIT_OF if (unit := _unit(one, unit_words)) in _SAYS_SENSOR]
+        if by_unit and rest and not is_unit and _symbol(unit_words) not in _SAYS_ANGLE:
+            return ColumnName(by_unit[0][0], axis, key, by_unit[0][1], rank=-3)
         return ColumnName("bare" if is_unit or not rest else "", axis, key, words=tuple(rest + unit_words))
     unit = _unit(sensor, unit_words) or _unit(sensor, left) if sensor in _UNIT_OF else ""
     rank = sum(points for known, points in _RANKS if not known.isdisjoint(rest))
     return ColumnName(sensor, axis, key, unit, rank=rank)
+
+
+def _about_axis(words: list[str], unit_words: list[str]) -> ColumnName | None:
+    """The gyro axis of ``p``, ``q``, ``r``, or of a rate of roll, pitch or yaw; None for other names."""
+    turns, rest = [word for word in words if word in _TURNS], words[1:]
+    if words[0] not in _RATES:
+        if len(turns) != 1 or _SPEEDS.isdisjoint(words):
+            return None
+        known = _SPEEDS | _OF_READINGS | {*turns}
+        rest = [word for word in words if word not in known and not _DEVICE_WORD.match(word)]
+    of_name = _unit("gyroscope", rest)
+    if rest and not of_name:
+        return None
+    axis, group = (_TURNS[turns[0]], "roll pitch yaw") if turns else (_RATES[words[0]], "p q r")
+    return ColumnName("gyroscope", axis, group, _unit("gyroscope", unit_words) or of_name, rank=-1)
 
 
 def _sensor(words: list[str]) -> str:
@@ -286,10 +331,10 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
         or not {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"}.isdisjoint(words)
         or all(w in _TIME_WORDS or w in _TIME_UNIT_OF for w in words)
     )
-    if is_time and {"x", "y", "z", "zone", "offset", "valid"}.isdisjoint(words):
+    if is_time and {"x", "y", "z", "zone", "valid"}.isdisjoint(words) and words[-1] != "offset":
         units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
         rank = 2 if words[0] in {"t", "time", "timestamp"} else 1
         if not units and {*words, joined} & _TICK_WORDS:
-            units = ["tick"]
+            units, rank = ["tick"], rank - 1
         return ColumnName("time", time_unit=units[-1] if units else "", rank=rank + bool(units and units[-1] != "tick"))
     return None

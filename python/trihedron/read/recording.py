@@ -32,7 +32,7 @@ from trihedron.read.sensors import Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Options
 from trihedron.read.temperature import temperature_of
-from trihedron.read.turning import turning_of
+from trihedron.read.turning import turning_of, turns_with
 from trihedron.records import Finding, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
@@ -160,7 +160,7 @@ def _audited(
         if progress is not None:
             progress((done + 1) / (len(present) + 1), f"checking the {name}")
         findings += audit_readings(name, triad, facts.of(name), windows, sensors.place)
-        if name == "accelerometer":
+        if name == "accelerometer" and all(one.code != "gravity-missing" for one in findings):
             findings += audit_motionless_accelerometer(windows, facts.of(name).step)
     if progress is not None:
         progress(1.0, f"read {len(time_s)} samples")
@@ -223,7 +223,7 @@ def _exchanged(sensors: Sensors, rate_hz: float) -> list[Finding]:
     """A finding where the readings named gyro turn, as gravity does, by those named accelerometer."""
     if sensors.accelerometer is None or sensors.gyroscope is None:
         return []
-    if not _turns_with(sensors.gyroscope, sensors.accelerometer, rate_hz):
+    if not turns_with(sensors.gyroscope, sensors.accelerometer, rate_hz):
         return []
     columns = sensors.columns
     swapped = replace(columns, accelerometer=columns.gyroscope, gyroscope=columns.accelerometer)
@@ -267,12 +267,6 @@ def _auxiliary(sensors: Sensors) -> dict[str, FloatArray]:
 
 # Columns without a role whose readings rotate as gravity does: a gyro with an unknown name.
 
-CLEAR_CORRELATION = 0.5
-"""Correlation of gravity's change with that predicted from three columns as rates: a gyro's is higher (0.74 for a hand
-that also accelerates), that of angles, fields and velocities below 0.1 (tests/test_read_unusual.py)."""
-FEWEST_PAIRS = 50
-"""Smallest number of blocks in motion, for which 0.5 is three and a half standard errors of a correlation."""
-
 
 def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
     """A warning for each triad of columns with unknown names, which differ only in one letter (``x``, ``y``, ``z``),
@@ -292,14 +286,8 @@ def _unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
             if x is None or y is None or z is None:
                 continue
             rates = np.stack([sensors.column(column) for column in (x, y, z)], axis=1)
-            if _turns_with(accelerometer, rates, rate_hz):
+            if turns_with(accelerometer, rates, rate_hz):
                 listed = " ".join(table.label(column) for column in (x, y, z))
                 mapping = replace(columns, gyroscope=(x, y, z)).mapping()
                 found.append(Finding.of("columns-assumed", "unnamed-gyro", taken=listed, mapping=mapping))
     return tuple(found)
-
-
-def _turns_with(gravity: FloatArray, rates: FloatArray, rate_hz: float) -> bool:
-    """Whether a triad (n, 3) turns as gravity does by the rates (n, 3) of another."""
-    turning = turning_of(gravity, rates, rate_hz)
-    return turning is not None and turning.correlation > CLEAR_CORRELATION and turning.n >= FEWEST_PAIRS

@@ -20,6 +20,8 @@ NEAR_GRAVITY = 0.2
 """Largest relative error of |a| of a static uncalibrated accelerometer: scale a few per cent, bias a tenth of g."""
 MG_OR_GAL = 0.015
 """Relative difference from 980.665 cm/s^2 below which a norm near 1000 mg is ambiguous; the two differ by 0.02."""
+GRAVITY_MISSING = 0.1
+"""Static |a| in g, by the stated unit and gravity in no other, below which gravity was subtracted."""
 WHOLE = "whole numbers"
 """Unit given to readings that were whole numbers before interpolation."""
 
@@ -68,11 +70,13 @@ def judge_accelerometer(
     """Unit of the accelerometer: as given, else as named, else from |a| in quiet windows."""
     norm = static_norm(readings, windows)
     stated = _stated(AccelerationUnit, named, given)
-    fitting = _of_gravity(norm)
+    fitting = of_gravity(norm)
     if stated is not None:
         gravities = norm * (acceleration_to_si(stated) or math.nan) / STANDARD_GRAVITY_M_S2
         if not (gravities < 0.6 or gravities > 1.5):
             return Judged(stated, (_statement("accelerometer", stated, given),))
+        if fitting is None and gravities < GRAVITY_MISSING:
+            return Judged(stated, (Finding.of("gravity-missing", static_norm=norm),))
         against = Finding.of(
             "unit-contradicted",
             "accelerometer",
@@ -115,7 +119,7 @@ _GRAVITY = {unit: STANDARD_GRAVITY_M_S2 / si for unit in AccelerationUnit if (si
 """Gravity in each unit."""
 
 
-def _of_gravity(norm: float) -> AccelerationUnit | None:
+def of_gravity(norm: float) -> AccelerationUnit | None:
     """The unit in which a static norm is gravity; ``None`` where it is in none."""
     nearest = min(_GRAVITY, key=lambda unit: abs(norm - _GRAVITY[unit]))
     return nearest if _is_near(norm, _GRAVITY[nearest]) else None

@@ -125,6 +125,19 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
     return None if found is None else replace(found, rate_hz=rate_hz)
 
 
+CLEAR_CORRELATION = 0.5
+"""Correlation of gravity's change with that predicted from three columns as rates: a gyro's is higher (0.74 for a hand
+that also accelerates), that of angles, fields and velocities below 0.1 (tests/test_read_unusual.py)."""
+FEWEST_PAIRS = 50
+"""Smallest number of blocks in motion, for which 0.5 is three and a half standard errors of a correlation."""
+
+
+def turns_with(gravity: FloatArray, rates: FloatArray, rate_hz: float) -> bool:
+    """Whether a triad (n, 3) turns as gravity does by the rates (n, 3) of another."""
+    turning = turning_of(gravity, rates, rate_hz)
+    return turning is not None and turning.correlation > CLEAR_CORRELATION and turning.n >= FEWEST_PAIRS
+
+
 @dataclass(frozen=True)
 class _Sums:
     """Normal matrix (9, 9), right side (9,) and sum of squares for gravity's change on rates; number of blocks."""

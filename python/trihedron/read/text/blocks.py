@@ -75,6 +75,9 @@ def as_plain(path: Path, data: bytes) -> bytes:
         )
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    rows = [line for line in data[: 1 << 16].split(b"\n")[:-1] if line.strip()]
+    if rows and all(line.endswith(b";") and line.count(b";") == 1 and b"," in line for line in rows):
+        data = data.replace(b";\n", b"\n")
     if data.startswith(b";"):
         # The first line and others that begin so are remarks where no other line contains a semicolon.
         rows = [line for line in data[: 1 << 16].split(b"\n")[:-1] if line.strip() and not line.startswith(b";")]

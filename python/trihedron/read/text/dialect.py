@@ -24,8 +24,12 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CLOCK = r"\d{1,2}:\d\d:\d\d[.,]\d{1,6}"
 _DATE = r"(?:\d{4}[-/]\d\d?[-/]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{4})[T ]"
 # Arduino IDE and PlatformIO's time filter; dated timestamps of CoolTerm and others; minicom's and Tera Term's in
-# brackets; a time with its unit in brackets, as boards write it.
+# brackets; a time with its unit in brackets, as boards write it; the logging of Zephyr and of ESP-IDF, which writes
+# milliseconds.
+_MILLISECONDS = re.compile(r"[EWIDV] \((\d+)\) [\w.-]+:[ \t]*")
 _PREFIXES = (
+    _MILLISECONDS,
+    re.compile(rf"\[({_CLOCK}(?:,\d\d\d)?)\] <\w+> \w+:[ \t]*"),
     re.compile(rf"({_CLOCK}) ?(?:->|>)[ \t]*"),
     re.compile(rf"({_DATE}{_CLOCK})(?: ?(?:->|>|:))[ \t]*"),
     re.compile(rf"\[({_DATE}{_CLOCK})\][ \t]*"),
@@ -35,15 +39,17 @@ _PREFIXES = (
 _VALUE = rf"{_DATE}{_CLOCK}|{_CLOCK}|{_NUMBER}"
 _PAIR = re.compile(
     rf"([^\W\d][\w.\[\]()/^°² -]*?)\s*[:=：]\s*({_VALUE})(?![\d:])"
-    r"(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?!\s*[:=：\w\[(]|\.\w))?"
+    r"(?:\s*((?:[^\W\d_]|°)[\w/^°²*]*)(?![\w/^°²*])(?!\s*[:=：\w\[(]|\.\w))?"
 )
-_HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])]|\b[^\W\d]\w{0,40})\s*[:=：]")
+_HAS_LABEL = re.compile(r".*?(?:[^\W\d]|[\])]|\b[^\W\d]\w{0,40})\s*(?:[:=：]|[\[({]\s*[-+.\d])")
 _BARE_TIMESTAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[^\W\d_])")
 _THREE = re.compile(
-    rf"([^\W\d]\w*)\s*[:=：]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])"
+    r"([^\W\d]\w*\s*(?:\([^\d()]*\)|\[[^\d\[\]]*\])?)\s*(?:[:=：]\s*[\[({]?|[\[({])"
+    rf"\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])\s*[\])}}]?"
 )
+"""A label, perhaps with a unit, and three values, perhaps in brackets."""
 _MOST_LABELS = 64
-_GROUP = re.compile(r"([^\W\d_]\w*)\s*[:=：]?\W*$")
+_GROUP = re.compile(r"([^\W\d_]\w*\s*(?:\([^()]*\)|\[[^\[\]]*\])?)\s*[:=：]?\W*$")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +70,9 @@ def rewrite(text: str) -> Rewritten | None:
     lines = text.split("\n")
     prefix = _prefix_of(lines)
     found = [None if prefix is None else prefix.match(line) for line in lines]
-    timestamps = [m.group(1) if m else "" for m in found]
-    unit = next((m["unit"] for m in found if m and "unit" in m.re.groupindex), "")
+    # A comma is the separator of the table.
+    timestamps = [m.group(1).replace(",", "" if "." in m.group(1) else ".") if m else "" for m in found]
+    unit = next((m["unit"] for m in found if m and "unit" in m.re.groupindex), "ms" if prefix is _MILLISECONDS else "")
     name = f"time [{unit}]" if unit else "arrival time"
     rests = [line[m.end() :] if m else line for line, m in zip(lines, found, strict=True)]
     labelled = _labelled(rests)
@@ -110,10 +117,13 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
     """(remarks above, names, rows of values, line of each row) of lines such as ``ax: 0.1, ay: 0.2``, or of
     groups of such lines.
 
-    A row ends where a label occurs again, so that lines may change their order, and a lost line leaves empty cells.
+    A row ends where a label occurs again, so that lines may change their order, and a lost line leaves empty cells,
+    and at a title that stands above each reading.
     """
     filled = [(i, line) for i, line in enumerate(lines, start=1) if line.strip()]
     sample = [line for _, line in filled[:_SAMPLE_LINES]]
+    titles = {line for line, n in Counter(sample).items() if n > 2 and not (line[:1].isdecimal() or _PAIR.search(line))}
+    sample = [line for line in sample if line not in titles]
     if len(sample) < 3 or not _nearly_all(_HAS_LABEL, sample):
         return None
     has_timestamp = _nearly_all(_BARE_TIMESTAMP, sample)
@@ -138,6 +148,9 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[i
             row.clear()
 
     for number, line in filled:
+        if line in titles:
+            end()
+            continue
         pairs = _pairs(_expanded(line, has_timestamp), known)
         known_labels = names if line.startswith(COMMENT_STARTS) else counts
         if not pairs or any(label not in known_labels for label, _ in pairs):
@@ -162,7 +175,7 @@ def _expanded(line: str, has_timestamp: bool) -> str:
     """The line with a label for each of three values that share one (``Accel: 1, 2, 3``), and for a bare timestamp."""
     if has_timestamp:
         line = _BARE_TIMESTAMP.sub(r"time: \1 ", line, count=1)
-    return _THREE.sub(r"\1 x: \2 \1 y: \3 \1 z: \4", line)
+    return _THREE.sub(r"; \1 x: \2 \1 y: \3 \1 z: \4", line)
 
 
 def _pairs(line: str, known: dict[str, list[str]]) -> list[tuple[str, str]]:
@@ -181,8 +194,12 @@ def _names(line: str) -> list[str]:
     """Names of the values of one line, such as ``Acceleration X: 1, Y: 2, Z: 3 m/s^2`` or ``Acc: X=1 Y=2 Z=3``."""
     out: list[tuple[str, str]] = []
     group, end = "", 0
+    said = {found.group(3) for found in _PAIR.finditer(line)}
     for found in _PAIR.finditer(line):
         label, unit = found.group(1).strip(), found.group(3) or ""
+        first, _, rest = label.partition(" ")
+        if out and rest and first in said:
+            out[-1], label = (out[-1][0], first), rest  # x:0.1 dps y:0.2 dps
         head = _GROUP.search(line[end : found.start()])
         if head is not None:
             group = head.group(1)

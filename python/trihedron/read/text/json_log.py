@@ -1,4 +1,5 @@
-"""JSON logs as tables: one object per line, a list of objects, columns by name, or the packets of known programs.
+"""JSON logs as tables: one object per line, a list of objects or one per sensor, columns by name, names beside lists
+of values, or the packets of known programs.
 
 Nested values are named by their path (``imu.acc.x``); arrays of objects inside a packet (Movesense) are its samples,
 with timestamps spread evenly to the next packet's; ``sensors`` and ``values`` are the format of Edge Impulse.
@@ -11,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.arrays import AXES
+from trihedron.read.columns import SENSORS
 from trihedron.read.errors import ReadError
+from trihedron.read.names import sensor_said
 from trihedron.read.text.dialect import Rewritten
 
 _FEWEST_ROWS = 4
@@ -78,9 +81,16 @@ def _of_value(value: Any) -> list[Row]:
         if isinstance(inner, Mapping) and all(isinstance(inner.get(key), list) for key in ("sensors", "values")):
             return _edge_impulse(inner)
         columns = {k: v for k, v in _flat(value).items() if isinstance(v, list) and v}
-        tables = [v for v in columns.values() if isinstance(v[0], Mapping)]
+        names = next((v for v in columns.values() if all(isinstance(name, str) for name in v)), [])
+        rows = next((v for v in columns.values() if isinstance(v[0], list) and len(v[0]) == len(names)), [])
+        if rows:
+            return [dict(zip(names, row, strict=False)) for row in rows]
+        tables = {k: v for k, v in columns.items() if isinstance(v[0], Mapping)}
+        sensors = {k: sensor_said(k.rsplit(".", 1)[-1]) for k in tables}
+        if {*SENSORS} <= {*sensors.values()}:
+            return [{"sensor": sensors[k]} | _flat(row) for k, rows in tables.items() if sensors[k] for row in rows]
         if tables:
-            return _of_value(max(tables, key=len))
+            return _of_value(max(tables.values(), key=len))
         longest = max(map(len, columns.values()), default=0)
         return [_flat({k: v[i] for k, v in columns.items() if len(v) == longest}) for i in range(longest)]
     items: list[Any] = value if isinstance(value, list) and value else [None]

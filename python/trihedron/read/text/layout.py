@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from trihedron.read.names import clock_said, parse_name, sensor_said, unit_said
+from trihedron.read.names import clock_said, is_rate, parse_name, sensor_said, unit_said
 
 COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
@@ -274,13 +274,20 @@ _STATEMENT = re.compile(r"^\W*(?P<what>[^:=\[(]+?)\s*(?:\bin\b|[:=\[(])\s*(?P<un
 
 def stated_units(lines: Iterable[str]) -> dict[str, str]:
     """First stated units of each sensor and of the time, under ``accelerometer unit``, ``gyroscope unit`` and
-    ``time unit``.
+    ``time unit``, and a stated rate.
 
     A clause must name only the sensor (and perhaps the word unit) and a unit: ``accelerometer range: 4 g`` and
-    ``gyro bias: 0.1 deg/s`` do not state the unit of the readings.
+    ``gyro bias: 0.1 deg/s`` do not state the unit of the readings. A rate among other settings of a line
+    (``Config: data_rate = 500 Hz, filter = 200 Hz``, or in the cell behind its name) is found under ``rate``.
     """
     found: dict[str, str] = {}
     for line in lines:
+        cells = re.split(r"[,;\t]", line.strip(" #%/\r"))
+        for cell, behind in zip(cells, [*cells[1:], ""], strict=True):
+            parts = [part.strip() for part in re.split("[:=]", cell) if part.strip()]
+            *_, key, value = "", *(parts if len(parts) > 1 else [*parts, behind.strip()])
+            if value[:1].isdecimal() and is_rate(key):
+                found.setdefault("rate", value)
         for clause in _CLAUSE.split(line.lower().strip(" #%/\r")):
             said = _STATEMENT.match(clause)
             sensor = sensor_said(said["what"]) if said else ""

@@ -43,7 +43,8 @@ _UNITS = {
     ("gravity-missing", "", SERIOUS): Words(
         "The accelerometer reads only {static_norm:.3g} while static: gravity is missing from it.",
         "'Linear' or 'user' acceleration of a phone, from which gravity was subtracted, or wrong columns.",
-        "Log the accelerometer itself; nothing here can be calibrated without gravity.",
+        "Log the accelerometer itself, or add the gravity that the program logs beside it; nothing can be calibrated "
+        "without gravity.",
     ),
     ("unit-contradicted", "accelerometer", SERIOUS): Words(
         f"The accelerometer is in {{unit:unit}} {_SOURCE}, but while static it reads {{static_norm:.4g}} "
@@ -113,6 +114,12 @@ _COLUMNS = {
         "No gyro was recognised, but columns {taken} turn as gravity turns in the accelerometer's axes.",
         "A gyro under a name that does not say so.",
         "If these are a gyro, read with --columns {mapping}.",
+    ),
+    ("columns-assumed", "by-values", WARNING): Words(
+        "{n_columns} columns have no names; they were taken as {mapping}: the accelerometer's length while static is "
+        "gravity{has_gyro:?, and it turns by the gyro's rates|; no columns turn as it does, so none are a gyro}.",
+        "A log without a header.",
+        "Check the order, and confirm it with --columns {mapping}.",
     ),
     ("columns-assumed", "header-ignored", WARNING): Words(
         "The line '{line}' above the numbers does not name their {n_columns} columns, so it was skipped.",

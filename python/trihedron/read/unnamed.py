@@ -1,0 +1,106 @@
+"""Columns without names of which the number does not say what they are: clocks and constants by their values, the
+accelerometer because its length while static is gravity, the gyro because it turns as gravity does."""
+
+import numpy as np
+
+from trihedron.arrays import TINY, FloatArray
+from trihedron.channel_facts.quiet import look
+from trihedron.read.names import ColumnName
+from trihedron.read.sensing import of_gravity, static_norm
+from trihedron.read.table import Table
+from trihedron.read.turning import CLEAR_CORRELATION, FEWEST_PAIRS, turning_of
+from trihedron.records import Finding
+
+_NEARLY_ALL = 0.999
+"""Smallest share of steps of a clock that are not backward."""
+_FEWEST_ROWS, _ROWS = 20, 200_000
+_ROWS_A_SECOND = 100.0
+"""Used where no clock tells; it sets the length of windows alone."""
+_UNEVEN = 0.1
+"""Largest spread of an uncalibrated accelerometer's length over its poses, as a share of its length."""
+_TURNED = 0.3
+"""Smallest spread of its direction [rad] over a log that shows more than one pose."""
+_ALIKE = 0.02
+"""Largest difference of correlation between raw and corrected rates; raw ones come first."""
+_SECONDS = (1e9, 4e9)
+"""Whole seconds since 1970."""
+
+Roles = dict[int, ColumnName]
+
+
+def by_values(table: Table, columns: list[int], time: int | None) -> tuple[Roles, tuple[Finding, ...]]:
+    """Roles of the unnamed ``columns``, and the finding that states them; none where the values do not tell.
+
+    ``time`` is a named clock. Of a table of one sensor, the first three columns that are neither clock nor constant are
+    its axes.
+    """
+    if table.n_rows < _FEWEST_ROWS:
+        return {}, ()
+    values = {i: table.columns[i][:_ROWS] for i in columns}
+    alive = [i for i, one in values.items() if np.any(one[np.isfinite(one)] != one[0])]
+    clock = next((i for i in alive if time is None and _is_clock(values[i])), None)
+    roles: Roles = {} if clock is None else {clock: ColumnName("time", rank=1)}
+    left = [i for i in alive if i not in roles and not _is_clock(values[i])]
+    if table.sensor is not None:
+        return (roles | _axes(table.sensor, left[:3]), ()) if len(left) >= len("xyz") else ({}, ())
+    known = clock if time is None else time
+    rate = _ROWS_A_SECOND if known is None else _rows_a_second(table.columns[known][:_ROWS])
+    readings = {
+        (i, i + 1, i + 2): np.stack([values[i], values[i + 1], values[i + 2]], axis=1)
+        for i in left
+        if {i + 1, i + 2} <= {*left}
+    }
+    acc = next((triad for triad, one in readings.items() if _is_gravity(one, rate)), None)
+    if acc is None:
+        return {}, ()
+    turning = {
+        triad: _correlation(readings[acc], one, rate) for triad, one in readings.items() if {*triad}.isdisjoint(acc)
+    }
+    least = max(CLEAR_CORRELATION, max(turning.values(), default=0.0) - _ALIKE)
+    gyr = next((triad for triad, one in turning.items() if one > least), None)
+    roles |= _axes("accelerometer", acc) | ({} if gyr is None else _axes("gyroscope", gyr))
+    words = {"time": "time", "accelerometer": "a", "gyroscope": "g"}
+    mapping = ",".join(f"{words[one.role]}{one.axis}={i + 1}" for i, one in roles.items() if one.role in words)
+    note = Finding.of("columns-assumed", "by-values", n_columns=len(columns), has_gyro=gyr is not None, mapping=mapping)
+    return roles, (note,)
+
+
+def _axes(sensor: str, triad: tuple[int, ...] | list[int]) -> Roles:
+    return {i: ColumnName(sensor, axis, "by values") for i, axis in zip(triad, "xyz", strict=True)}
+
+
+def _is_clock(values: FloatArray) -> bool:
+    return bool(values[-1] > values[0] and np.mean(np.diff(values) >= 0.0) >= _NEARLY_ALL)
+
+
+def are_nanoseconds(seconds: FloatArray, values: FloatArray) -> bool:
+    """Whether values (n,) are the nanoseconds behind whole ``seconds`` (n,) since 1970."""
+    if not (len(values) == len(seconds) > 0 and _SECONDS[0] < seconds[0] < _SECONDS[1]):
+        return False
+    return bool(np.all(seconds == np.rint(seconds)) and values.min() >= 0.0 and 1e6 < values.max() < 1e9)
+
+
+def _rows_a_second(time: FloatArray) -> float:
+    """Rows in a second of a clock in s, ms, µs or ns, of which the step is the first below a second."""
+    step = float(np.median(np.diff(time)))
+    fitting = [size for size in (1.0, 1e-3, 1e-6, 1e-9) if 0.0 < step * size < 1.0]
+    return 1.0 / (step * fitting[0]) if fitting else _ROWS_A_SECOND
+
+
+def _is_gravity(readings: FloatArray, rate_hz: float) -> bool:
+    """Whether readings (n, 3) have the length of gravity in every static interval, in several directions."""
+    readings = readings[np.isfinite(readings).all(axis=1)]
+    windows = look({"accelerometer": readings}, rate_hz)
+    if windows is None or of_gravity(static_norm(readings, windows)) is None:
+        return False
+    mean = windows.quiet_mean("accelerometer")
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.linalg.norm(mean, axis=1)
+        direction = mean / np.maximum(length, TINY)[:, None]
+        return bool(length.std() < _UNEVEN * length.mean() and np.linalg.norm(direction.std(axis=0)) > _TURNED)
+
+
+def _correlation(gravity: FloatArray, rates: FloatArray, rate_hz: float) -> float:
+    """Correlation of the change of gravity (n, 3) with what rates (n, 3) predict; 0 where it cannot be judged."""
+    turning = turning_of(gravity, rates, rate_hz)
+    return 0.0 if turning is None or turning.n < FEWEST_PAIRS else turning.correlation
