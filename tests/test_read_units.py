@@ -8,7 +8,7 @@ import pytest
 import trihedron
 from hand_made_sessions import motion
 from test_read import HEADER, codes, finding, write
-from trihedron.read import read_recording
+from trihedron.read import ReadError, read_recording
 from trihedron.read.names import parse_name
 from trihedron.read.turning import turning_of
 from trihedron.records import Severity
@@ -17,6 +17,7 @@ from trihedron.units import RateUnit
 RATE_HZ = 100.0
 OTHERS = (
     "mx | qx | Roll | depth_m | angular_velocity_covariance_0 | orientation.x | gravity_x | gyro_integral_dt | ___ | "
+    "yaw_rate_setpoint | yaw | time_offset | "
     "accel_bias_x | UTC_Nano | magnetometer_x | angular_acceleration_x | gps_velocity_x | маг_x"
 )
 
@@ -65,6 +66,12 @@ def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_ser
     noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))
     recording = read_recording(saved(tmp_path / "log.csv", time_s, noise, rate))
     assert finding(recording, "gravity-missing").severity is Severity.SERIOUS
+    user = HEADER.replace("ax", "user_acc_x (g)").replace("ay", "user_acc_y (g)").replace("az", "user_acc_z (g)")
+    time_s, _, rate = motion(RATE_HZ, 3, 6)
+    noise = 0.02 * np.random.default_rng(5).standard_normal((len(time_s), 3))
+    recording = read_recording(saved(tmp_path / "user.csv", time_s, noise, rate, user))
+    assert finding(recording, "gravity-missing").severity is Severity.SERIOUS
+    assert not {"stuck-values", "unit-contradicted"} & {*codes(recording)}
 
 
 @pytest.mark.parametrize("gyro_first", [False, True])
@@ -77,6 +84,36 @@ def test_six_columns_without_names_are_put_in_order_by_gravity(tmp_path, gyro_fi
     np.testing.assert_array_equal(recording.gyroscope, rate)
     severity = Severity.WARNING if gyro_first else Severity.NOTE
     assert finding(recording, "columns-assumed").severity is severity
+
+
+def test_columns_without_names_are_told_by_gravity_and_its_turning_and_the_mapping_stated_reads_the_same(tmp_path):
+    time_s, force, rate = motion(RATE_HZ, 3, 6)
+    other = np.random.default_rng(6).standard_normal((len(time_s), 4))
+    ns = np.rint(1e9 * time_s).astype(np.int64)
+    seconds = np.column_stack([1709294400 + ns // 10**9, ns % 10**9])
+    table = np.column_stack([seconds, np.full(len(time_s), 3), other[:, :2], rate, other[:, 2:], force])
+    path = write(tmp_path / "log.txt", table, "", separator=" ")
+    guessed = read_recording(path)
+    said = finding(guessed, "columns-assumed")
+    assert said.severity is Severity.WARNING
+    mapping = "time=1,ax=11,ay=12,az=13,gx=6,gy=7,gz=8"
+    assert mapping in str(said)
+    for recording in (guessed, read_recording(path, columns=mapping)):
+        np.testing.assert_array_equal(recording.accelerometer, force)
+        np.testing.assert_array_equal(recording.gyroscope, rate)
+        # The last digit of a time since 1970 in double precision.
+        np.testing.assert_allclose(recording.time_s, time_s, rtol=0.0, atol=1e-6)
+    with pytest.raises(ReadError, match="13 columns without names could mean anything"):
+        read_recording(write(tmp_path / "static.txt", table[:200], "", separator=" "))
+
+
+def test_instruments_side_by_side_are_chosen_by_the_path_before_a_colon(tmp_path):
+    time_s, force, rate = motion(RATE_HZ, 3, 2)
+    names = [f"IMU_ATTI({k}):{name}{x}" for k in (0, 1) for name in ("accel", "gyro") for x in "XYZ"]
+    table = np.column_stack([time_s, force, rate, force + 0.1, rate + 0.1])
+    path = write(tmp_path / "flight.csv", table, ",".join(["Clock:offsetTime", *names]) + "\n")
+    np.testing.assert_array_equal(read_recording(path, instance="IMU_ATTI(1)").accelerometer, force + 0.1)
+    assert "columns-assumed" in codes(read_recording(path))
 
 
 def test_an_undecidable_order_is_said_to_be_a_guess(tmp_path):
@@ -95,24 +132,28 @@ MEANINGS = {
     ("accelerometer", "x", "g"): "ax_g | accelerometerAccelerationX(G) | Beschl. X [g] | 加速度X(g) | X轴加速度（g）",
     ("accelerometer", "x", "mg"): "acc_x (mg)",
     ("accelerometer", "0", "m/s^2"): "accelerometer_m_s2[0]",
-    ("accelerometer", "x", "m/s^2"): "Acceleration x (m/s^2) | ax [m/s²] | Acel X (m/s²)",
+    (
+        "accelerometer",
+        "x",
+        "m/s^2",
+    ): "Acceleration x (m/s^2) | ax [m/s²] | Acel X (m/s²) | a x [meters per second squared]",
     ("accelerometer", "z", "m/s^2"): "a_RS_S_z [m s^-2]",
     ("gyroscope", "x", ""): "wx | gyro_x | gx_output | AngularVelocityX | GyX | girox | ωx",
     ("gyroscope", "y", ""): "Gyr_Y | vitesse_angulaire_y | prędkość kątowa Y",
-    ("gyroscope", "z", ""): "gyr_z | field.angular_velocity.z | GYRO_ZOUT | угл_скорость_z",
+    ("gyroscope", "z", ""): "gyr_z | IMU_YAW_VEL | gyro_yaw | field.angular_velocity.z | GYRO_ZOUT | угл_скорость_z",
     ("gyroscope", "z", "counts"): "wz_adc",
-    ("gyroscope", "x", "deg/s"): "gx_dps | GyroX [deg/s] | gx [°/s]",
+    ("gyroscope", "x", "deg/s"): "gx_dps | GyroX [deg/s] | gx [°/s] | AsX(°/s) | roll rate (deg/s)",
     ("gyroscope", "y", "deg/s"): "гироскоп_Y (град/с)",
     ("gyroscope", "z", "deg/s"): "Drehrate Z [°/s] | 角速度Z(°/s)",
     ("gyroscope", "2", "rad/s"): "gyro_rad[2]",
     ("gyroscope", "x", "rad/s"): "w_RS_S_x [rad s^-1] | gyroRotationX(rad/s) | omega x [rad s^-1]",
-    ("gyroscope", "y", "rad/s"): "Gyroscope y (rad/s)",
+    ("gyroscope", "y", "rad/s"): "Gyroscope y (rad/s) | rotation_rate_y(radians/s) | wy radians per second",
     ("gyroscope", "z", "rad/s"): "Giro Z (rad/s)",
     ("gyroscope", "z", "mrad/s"): "gyro_z (mrad/s)",
-    ("time", "", ""): "t | time | %time | время | temps | 时间",
-    ("time", "", "s"): "t_s | t_unix_s | Time (s) | seconds_elapsed",
+    ("time", "", ""): "t | time | Clock:offsetTime | %time | время | temps | 时间",
+    ("time", "", "s"): "X[s] | t_s | t_unix_s | Time (s) | seconds_elapsed",
     ("time", "", "ms"): "time_ms | millis | время, мс | Tempo (ms)",
-    ("time", "", "us"): "t [µs] | t [\u03bcs]",
+    ("time", "", "us"): "utime | t [µs] | t [\u03bcs]",
     ("time", "", "ns"): "timestamp [ns] | Timestamp[nanosec]",
     ("time", "", "100us"): "SampleTimeFine",
     ("temperature", "", ""): "Temperature | imu_temperature | 温度(℃)",
@@ -139,6 +180,8 @@ def test_what_is_neither_sensor_nor_time_is_not_taken_for_one(name):
 def test_raw_readings_rank_above_corrected_ones():
     assert parse_name("gx_measured").rank > parse_name("gx").rank > parse_name("gx_output").rank
     assert parse_name("motionUserAccelerationX(G)").rank < parse_name("accelerometerAccelerationX(G)").rank
+    assert parse_name("Rotation_X").rank < parse_name("Gyroscope_X").rank
+    assert parse_name("Tick#").rank < parse_name("Clock:offsetTime").rank
 
 
 def log_of(tmp_path, header, change=lambda row: row):

@@ -16,6 +16,7 @@ from trihedron.records import Finding
 from trihedron.records.words import Words
 from trihedron.records.words import words as phrase
 
+_PATH = re.compile(r"(?P<device>[^:]+):(?P<rest>.+)")
 _BEFORE = re.compile(r"\s*(?P<device>[^\W_]+)[_.:/ -]+(?P<rest>[^\W\d_].*)")
 _BEHIND = re.compile(r"(?P<rest>.*?[^\W\d_])(?:[_.: -]+(?P<device>[^\W_]+)|(?P<number>\d))(?P<unit>\s*[\[(].*)?\s*")
 
@@ -51,7 +52,7 @@ def one_beside(table: Table, instance: str | None) -> Table:
 
 def _devices(names: tuple[str, ...]) -> Devices:
     """Devices that the names identify: two or more with the same columns, which include a complete sensor."""
-    for form in (_BEFORE, _BEHIND):
+    for form in (_PATH, _BEFORE, _BEHIND):
         found: Devices = {}
         for i, name in enumerate(names):
             if (parts := form.fullmatch(name)) is not None:

@@ -56,8 +56,10 @@ def by_values(table: Table, columns: list[int], time: int | None) -> tuple[Roles
     turning = {
         triad: _correlation(readings[acc], one, rate) for triad, one in readings.items() if {*triad}.isdisjoint(acc)
     }
-    least = max(CLEAR_CORRELATION, max(turning.values(), default=0.0) - _ALIKE)
-    gyr = next((triad for triad, one in turning.items() if one > least), None)
+    best = max(turning, key=lambda triad: turning[triad], default=acc)
+    least = max(CLEAR_CORRELATION, turning.get(best, 0.0) - _ALIKE)
+    # One that shares columns with the best is as good where no turn was about the axis that it lacks.
+    gyr = next((t for t, one in turning.items() if one > least and (t == best or {*t}.isdisjoint(best))), None)
     roles |= _axes("accelerometer", acc) | ({} if gyr is None else _axes("gyroscope", gyr))
     words = {"time": "time", "accelerometer": "a", "gyroscope": "g"}
     mapping = ",".join(f"{words[one.role]}{one.axis}={i + 1}" for i, one in roles.items() if one.role in words)

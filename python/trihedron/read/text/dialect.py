@@ -219,25 +219,29 @@ def _names(line: str) -> list[str]:
     return [f"{label} [{unit}]" if unit else label for (label, _), unit in zip(out, reversed(units), strict=True)]
 
 
-# Texts with a record type as the first word of each line, as GnssLogger writes, split into one table per sensor.
+# Texts with a record type as the first word of each line, as GnssLogger writes, or behind a time and before another
+# number of values for each type; split into one table per sensor.
 
 _MOST_RECORDS_SEEN = 4000
+_FEW = 50
 _WORD = re.compile(r"\$?[^\W\d]\w*:?$")
+_SECOND = re.compile(r"[-+.\d]+[,;\t ]\s*[^\W\d]\w*[,;\t ]")
 
 
 def split_records(text: str) -> tuple[dict[str, Rewritten], dict[str, int]] | None:
-    """The lines of ``accelerometer`` and ``gyroscope``, each with its header; and the number of lines by first word.
+    """The lines of ``accelerometer`` and ``gyroscope``, each with its header; and the number of lines by record type.
 
-    None where the first words do not identify both sensors.
+    None where the record types do not identify both sensors.
     """
     lines = text.split("\n")
-    separator = _separator(lines[:_MOST_RECORDS_SEEN])
-    if separator is None:
+    separator, place = _separator(lines[:_MOST_RECORDS_SEEN])
+    if not separator:
         return None
     rows: dict[str, list[int]] = {}
     headers: dict[str, int] = {}
     for i, line in enumerate(lines):
-        word, *fields = split(line.lstrip("#%/ \t"), separator) or [""]
+        fields = split(line.lstrip("#%/ \t"), separator)
+        word = fields.pop(place) if len(fields) > place else ""
         if fields and _WORD.match(word):
             if not any(is_number(field, False) for field in fields):
                 headers.setdefault(word, i)
@@ -253,14 +257,19 @@ def split_records(text: str) -> tuple[dict[str, Rewritten], dict[str, int]] | No
     return out, {word: len(held) for word, held in rows.items()}
 
 
-def _separator(lines: list[str]) -> str | None:
-    """The separator of lines with a first word and three or more numbers; None where most lines are not such lines."""
-    first = [line[:1] for line in lines]
-    if sum(map(str.isalpha, first)) + sum(map(first.count, ("$", "_", ""))) < max(4.0, 0.3 * len(lines)):
-        return None
+def _separator(lines: list[str]) -> tuple[str, int]:
+    """The separator of lines with a record type and three or more numbers, and the type's place; "" where most lines
+    are not such lines."""
+    lines = [line for line in lines if line.strip() and not line.startswith(("#", "%"))]
+    place = int(sum(_SECOND.match(line) is not None for line in lines[:_FEW]) > 0.5 * len(lines[:_FEW]))
+    if not place and sum(line[0].isalpha() or line[0] in "$_" for line in lines) < max(4.0, 0.3 * len(lines)):
+        return "", 0
     for separator in (",", ";", "\t", " "):
-        rows = [split(line, separator) for line in lines if line.strip() and not line.startswith(("#", "%"))]
-        fitting = [r for r in rows if len(r) >= 4 and _WORD.match(r[0]) and sum(is_number(f, False) for f in r) >= 3]
-        if len(fitting) >= max(4.0, 0.5 * len(rows)) and len({r[0] for r in fitting}) >= 2:
-            return separator
-    return None
+        rows = [split(line, separator) for line in lines]
+        fitting = [
+            r for r in rows if len(r) >= 4 and _WORD.match(r[place]) and sum(is_number(f, False) for f in r) >= 3
+        ]
+        is_ragged = not place or len({len(r) for r in fitting}) > 1
+        if len(fitting) >= max(4.0, 0.5 * len(rows)) and len({r[place] for r in fitting}) >= 2 and is_ragged:
+            return separator, place
+    return "", 0

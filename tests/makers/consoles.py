@@ -1,0 +1,63 @@
+"""Text logs saved from consoles: of boards, and of ROS."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from makers.layout import nanoseconds, text, written
+
+
+def _padded(value: float) -> str:
+    return f"{'-' if value < 0.0 else ' '}{abs(value):08.2f}"
+
+
+@text("ESP-IDF (log lines)", "monitor.txt", 50, ("g", "deg/s"), (3, 2))
+def esp_idf(s, a, w):
+    """ESP_LOGI: level, milliseconds since the start in brackets, a tag, then what the sketch prints, in two lines."""
+    out = "I (312) main_task: Calling app_main()\n"
+    for ms, x, y in zip(np.rint(1000 + 1000 * s.time_s).astype(int), a, w, strict=True):
+        out += "I ({}) IMU: Accel X: {:.3f}, Y: {:.3f}, Z: {:.3f}\n".format(ms, *x)
+        out += "I ({}) IMU: Gyro X: {:.2f}, Y: {:.2f}, Z: {:.2f}\n".format(ms, *y)
+    return out
+
+
+@text("Zephyr (sensor sample)", "zephyr.txt", 20, ("m/s^2", "deg/s"), options={"rate_hz": 20.0})
+def zephyr(s, a, w):
+    """Zephyr's sample of an LSM6DSO: a title above each reading, the unit behind each value as ``ms/2`` and ``dps``."""
+    out = "*** Booting Zephyr OS build v3.6.0 ***\n"
+    for k in range(s.n):
+        out += "LSM6DSO sensor samples:\n\naccel x:{:.6f} ms/2 y:{:.6f} ms/2 z:{:.6f} ms/2\n".format(*a[k])
+        out += "gyro x:{:.6f} dps y:{:.6f} dps z:{:.6f} dps\ntrig_cnt:{}\n\n".format(*w[k], k)
+    return out
+
+
+@text("SparkFun ICM-20948", "icm.txt", 30, ("mg", "deg/s"), (2, 2), options={"rate_hz": 30.0})
+def sparkfun_icm_20948(_, a, w):
+    """SparkFun's ICM-20948 library, printScaledAGMT: a label with its unit, three padded values in brackets."""
+    lines = []
+    for x, y in zip(a, w, strict=True):
+        acc, gyr = (", ".join(map(_padded, v)) for v in (x, y))
+        lines.append(f"Scaled. Acc (mg) [ {acc} ], Gyr (DPS) [ {gyr} ], Mag (uT) [  00012.00, -00003.00,  00041.00 ]\n")
+    return "Initialization of the sensor returned: All is well.\n" + "".join(lines)
+
+
+@text("ROS (rostopic echo)", "imu.txt", 100)
+def rostopic_echo_messages(s, a, w):
+    """rostopic echo /imu > imu.txt: indented keys, ``---`` behind each message."""
+    cov = "[" + ", ".join(["0.0"] * 9) + "]"
+    out = []
+    for k, ns in enumerate(nanoseconds(s)):
+        out.append(f"header: \n  seq: {k}\n  stamp: \n    secs: {ns // 10**9}\n    nsecs: {ns % 10**9:9d}\n")
+        out.append(f'  frame_id: "imu"\norientation: \n  x: 0.0\n  y: 0.0\n  z: 0.0\n  w: 1.0\ncovariance: {cov}\n')
+        for name, v in (("angular_velocity", w[k].tolist()), ("linear_acceleration", a[k].tolist())):
+            out.append("{}: \n  x: {}\n  y: {}\n  z: {}\n".format(name, *v) + f"{name}_covariance: {cov}\n")
+        out.append("---\n")
+    return "".join(out)
+
+
+@text("ROS 2 (topic echo --csv)", "imu.csv", 100)
+def ros2_topic_echo_csv(s, a, w):
+    """ros2 topic echo --csv /imu: every field of the message, and no names."""
+    ns = np.array(nanoseconds(s))
+    zero = [np.zeros(s.n)] * 9
+    return written(ns // 10**9, ns % 10**9, ["imu"] * s.n, *zero[:3], zero[0] + 1, *zero, *w.T, *zero, *a.T, *zero)
