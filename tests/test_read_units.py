@@ -107,6 +107,19 @@ def test_columns_without_names_are_told_by_gravity_and_its_turning_and_the_mappi
         read_recording(write(tmp_path / "static.txt", table[:200], "", separator=" "))
 
 
+@pytest.mark.parametrize("name", ["LSM6DSO {}", "BMI160 {} Non-wakeup", "K6DS3TR {} Sensor", "android.sensor.{}"])
+def test_rows_in_turn_are_told_by_the_names_that_android_gives_to_parts(tmp_path, name):
+    time_s, force, rate = motion(50.0, 3, 3)
+    lines = ["timestamp,sensor,x,y,z"]
+    for t, a, w in zip(np.rint(1e3 * time_s), force.tolist(), rate.tolist(), strict=True):
+        for kind, values in (("Accelerometer", a), ("Gyroscope", w), ("Magnetometer", w)):
+            lines.append(",".join([f"{t:.0f}", name.format(kind), *map(repr, values)]))
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    recording = read_recording(tmp_path / "log.csv")
+    np.testing.assert_array_equal(recording.accelerometer, force)
+    np.testing.assert_array_equal(recording.gyroscope, rate)
+
+
 def test_instruments_side_by_side_are_chosen_by_the_path_before_a_colon(tmp_path):
     time_s, force, rate = motion(RATE_HZ, 3, 2)
     names = [f"IMU_ATTI({k}):{name}{x}" for k in (0, 1) for name in ("accel", "gyro") for x in "XYZ"]

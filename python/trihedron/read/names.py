@@ -59,9 +59,11 @@ _OTHER_TIMES = frozenset({"min", "minute", "h", "hr", "hour"})
 """Words after which a unit is not one per second: rad/min begins as rad does."""
 _OF_READINGS = frozenset(
     {"unit", "units", "raw", "data", "reading", "readings", "value", "values", "uncal", "uncalibrated", "total"}
-    | {"type", "imu", "sensor", "android", "rate", "velocity"}
+    | {"type", "imu", "sensor", "android", "rate", "velocity", "axis", "non", "wakeup"}
 )
 """Words beside the name of a sensor that change nothing in what it measures."""
+_PART = re.compile(r"[a-z]\d[a-z]|\d\d|^3$")
+"""In the name of a part, by which Android names sensors: LSM6DSO Accelerometer, 3-axis Gyroscope; not in imu2."""
 _COUNTS = frozenset({"lsb", "digit", "digits", "count", "counts"})
 """Words for counts; mg/LSB is the LSB, not a unit of the readings."""
 _RATES = {"p": "x", "q": "y", "r": "z"}
@@ -190,7 +192,8 @@ def sensor_said(text: str) -> str:
     words = english(_WORD.findall(_CAMEL.sub(r"\1 \2", plain(text)).lower()))
     sensor = "" if len(words) > 1 and is_rate(text) else _sensor(words)
     known = _SENSOR_WORDS.get(sensor)
-    return sensor if known is not None and all(known.fullmatch(w) or w in _OF_READINGS for w in words) else ""
+    is_known = known is not None and all(known.fullmatch(w) or w in _OF_READINGS or _PART.search(w) for w in words)
+    return sensor if is_known else ""
 
 
 def unit_said(sensor: str, text: str) -> str:

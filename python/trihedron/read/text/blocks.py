@@ -29,6 +29,8 @@ _COMPRESSED: dict[bytes, tuple[str, Any]] = {
 _MINUS = "\u2212".encode()
 """The minus sign that typesetting programs and some spreadsheets write for ``-``."""
 _COMMENTS = tuple(mark.encode() for mark in COMMENT_STARTS)
+_COLOURS = re.compile(rb"\x1b\[[\d;]*[A-Za-z]")
+"""Sequences by which consoles write in colours."""
 _QUOTED = re.compile(rb'"[^"]*"')
 
 
@@ -73,6 +75,8 @@ def as_plain(path: Path, data: bytes) -> bytes:
             f"{path}: line {1 + data.count(10, 0, zero)} contains binary data (a zero byte), so this is not a text "
             "log; convert it to CSV, or delete the damaged lines."
         )
+    if b"\x1b[" in data:
+        data = _COLOURS.sub(b"", data)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     rows = [line for line in data[: 1 << 16].split(b"\n")[:-1] if line.strip()]

@@ -49,6 +49,7 @@ _THREE = re.compile(
 )
 """A label, perhaps with a unit, and three values, perhaps in brackets."""
 _MOST_LABELS = 64
+_LABEL = re.compile(rf"\s*[^\W\d]\w*:(?=\s*{_NUMBER}(?:\s*[,;\t ]\s*{_NUMBER}){{3,}}\s*$)")
 _GROUP = re.compile(r"([^\W\d_]\w*\s*(?:\([^()]*\)|\[[^\[\]]*\])?)\s*[:=：]?\W*$")
 
 
@@ -86,7 +87,7 @@ def rewrite(text: str) -> Rewritten | None:
         first = [numbers[0]] * (len(preamble) + 1)
         return Rewritten.of([*preamble, ",".join(names), *rows], [*first, *numbers])
     if prefix is None:
-        return None
+        return _without_label(lines)
     filled = [rest for rest in rests if re.match(rf"\s*{_NUMBER}\s*[,;\t ]", rest)]
     glue = next((s for s in (",", ";", "\t") if filled and s in filled[-1]), " ")
     rows = []
@@ -94,6 +95,15 @@ def rewrite(text: str) -> Rewritten | None:
         is_row = re.match(r"\s*[-+.\d]", rest) is not None
         rows.append(f"{timestamp if is_row else name}{glue}{rest}" if timestamp and rest.strip() else rest)
     return Rewritten.of(rows, range(1, len(rows) + 1))
+
+
+def _without_label(lines: list[str]) -> Rewritten | None:
+    """Rows of more than three values behind one label, the same in every line (``IMU:1,2,3,4,5,6``), without it."""
+    found = [_LABEL.match(line) for line in lines]
+    heads = [m[0] if m else "" for m, line in zip(found, lines, strict=True) if line.strip()]
+    if not heads or heads.count(heads[-1]) < NEARLY_ALL * len(heads) or not heads[-1]:
+        return None
+    return Rewritten.of([line.removeprefix(heads[-1]) for line in lines], range(1, len(lines) + 1))
 
 
 def _prefix_of(lines: list[str]) -> re.Pattern[str] | None:
