@@ -287,7 +287,7 @@ def test_devices_side_by_side_are_identified_by_the_names_of_their_columns(tmp_p
         np.testing.assert_allclose(recording.gyroscope, sign * rate, atol=1e-5)
         assert not recording.auxiliary
     if devices[0] == "A" and form.startswith("{d}"):
-        with pytest.raises(ReadError, match=r"identify 2 devices: A, B; .*--instance A"):
+        with pytest.raises(ReadError, match=r"identify 2 devices: A, B; .*--instance 'A'"):
             read_recording(log)
 
 

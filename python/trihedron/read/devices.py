@@ -45,9 +45,14 @@ def one_beside(table: Table, instance: str | None) -> Table:
     if instance is None and devices and not any(parse_name(name).role in SENSORS for name in table.names or ()):
         raise ReadError(
             f"{table.path}: the names of the columns identify {len(devices)} devices: {', '.join(devices)}; read one "
-            f"of them with --instance {next(iter(devices))}."
+            f"of them with --instance {_quoted(next(iter(devices)))}."
         )
     return table
+
+
+def _quoted(device: str) -> str:
+    """A device as an argument of a shell; a word in capitals would look like the placeholder of one."""
+    return device if re.fullmatch(r"[a-z\d_]+", device) else f"'{device}'"
 
 
 def _devices(names: tuple[str, ...]) -> Devices:
@@ -135,7 +140,7 @@ def one_device(table: Table, options: Options, chosen_columns: Columns) -> Table
     if options.instance is None:
         raise ReadError(
             f"{table.path}: column {table.label(column)} identifies {len(words)} devices: {listed}; read one of them "
-            f"with --instance {words[0]}."
+            f"with --instance {_quoted(words[0])}."
         )
     if options.instance not in words:
         raise ReadError(
