@@ -168,12 +168,6 @@ class Carried:
         derivative = np.concatenate([self.wrt_accelerometer, self.wrt_scale], axis=2)
         return _across2(self.up, derivative @ _root(covariance[:21, :21]))
 
-    def in_plane(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Residual (m, 2), its covariance (m, 2, 2) and derivatives (m, 2, 9) in the plane across the vertical."""
-        plane = np.linalg.svd(self.up[:, None, :])[2][:, 1:]
-        residual = np.einsum("mij,mj->mi", plane, self.residual)
-        return residual, plane @ self.covariance @ np.swapaxes(plane, 1, 2), plane @ self.wrt_scale
-
 
 def carried(
     measured: MoveMeasurements, anchors_s: FloatArray, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray

@@ -143,11 +143,6 @@ def _shared(solution: SessionSolution, steady: Observed, likely: dict[str, list[
     return out
 
 
-def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
-    """The solution with another prior (in ``observed``), started from ``solution``, at the same noise strengths."""
-    return _solution(observed, _again(observed, solution.core, solution.core.strengths))
-
-
 def _again(
     observed: Observed, core: _core.SessionFit, strengths: Strengths, within: Bounds | None = None, *,
     is_rough: bool = False,
@@ -208,25 +203,16 @@ def _drift(observed: Observed, core: _core.SessionFit, sensor: int, S: FloatArra
 
 
 def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
-    """Moves (m,) whose tilt errors are outliers among all moves."""
+    """Moves (m,) whose tilt errors are outliers among all: squared Mahalanobis distances beyond χ² at ``FALSE_ALARM``
+    for all of them, in units of the usual one, that of their median, where it is above the noise."""
     labels = solution.core.labels
     of_gravity = labels[:, 0] == MOVES
     squared = (solution.core.residual[of_gravity] * solution.inflation[0]) ** 2
     distance = np.bincount(labels[of_gravity, 1], squared, n_moves).astype(np.float64)
-    return are_far(distance, solution.moves_dof)
-
-
-def are_far(distance: FloatArray, dof: float) -> BoolArray:
-    """Outliers among squared Mahalanobis distances (n,) of two components each, with ``dof`` degrees of freedom in all:
-    beyond χ² at ``FALSE_ALARM`` for all n, in units of :func:`usual_miss`."""
-    return distance > chdtri(2, FALSE_ALARM / len(distance)) * usual_miss(distance, dof)
-
-
-def usual_miss(distance: FloatArray, dof: float) -> float:
-    """Squared distance per component, from the median of ``distance`` (n,) and ``dof``; at least 1 (sample noise)."""
-    # The fit reduces the residuals by dof over the number of components.
-    shrink = max(dof / (2.0 * len(distance)), LEAST_SHRINK)
-    return max(1.0, median(distance) / (MEDIAN_CHI2[2] * shrink))
+    # The fit reduces the residuals by its degrees of freedom over the number of components.
+    shrink = max(solution.moves_dof / (2.0 * n_moves), LEAST_SHRINK)
+    usual = max(1.0, median(distance) / (MEDIAN_CHI2[2] * shrink))
+    return distance > chdtri(2, FALSE_ALARM / n_moves) * usual
 
 
 def _fit(

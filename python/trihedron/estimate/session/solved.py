@@ -16,11 +16,11 @@ from trihedron.estimate.gyroscope.lost_samples import (
     relative_sigma,
 )
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.session.carried import Carried, HeldOut, held_out, move_quality, norm_quality
-from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
+from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, HeldOut, held_out, move_quality, norm_quality
+from trihedron.estimate.session.fit import SessionSolution, far_moves, solve_session
 from trihedron.estimate.session.observed import Near
-from trihedron.estimate.session.start import Log, begun, is_enough, near_one_another
-from trihedron.probability import FALSE_ALARM, chdtri, fdtrc
+from trihedron.estimate.session.start import Log, begun
+from trihedron.probability import FALSE_ALARM, fdtrc
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.session.noise import NOISE_DOF
 
@@ -91,15 +91,15 @@ def solved(log: Log) -> SolvedSession:
     """
     measured = measure_moves(log.recording, log.segments, log.accelerometer)
     near = begun(log, measured)
-    found = _fitted(log, measured, near)
+    whole, found = _fitted(log, measured, near)
     # Nonlinearities and delays would be taken for filters: that there is one the noise at rest must show.
     if found.solution.smooths_more_than_means and _has_low_pass(log.recording):
         log = replace(log, is_filtered=True)
-        found = _fitted(log, measured, near)
+        whole, found = _fitted(log, measured, near)
     solution, seen = found.solution, found.seen
     left_out = held_out(found.shown, log.anchors_s(measured), solution)
     covariance = solution.covariance.copy()
-    losses = _losses(log, found)
+    losses = _losses(log, whole, found)
     own_sigma = relative_sigma(covariance[12:, 12:], solution.S_w)
     covariance[12:, 12:] = losses.widened(covariance[12:, 12:], solution.S_w, solution.b_w)
     quality = move_quality(
@@ -132,35 +132,22 @@ def _has_low_pass(recording: Recording) -> bool:
     return bool(found) and all(one.corner_hz is not None for one in found["gyroscope"])
 
 
-def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> _Fit:
-    """The fit without outlier moves: a disturbed move would widen the variance of all. Moves that were excluded at
-    first are included again where the fit of the others does not contradict them."""
-    used = near_one_another(log, measured, near)
-    found = _fit(log, measured, used, near)
-    if found.outliers:
-        used = used | (~measured.is_lost & ~_denied(found))
-        found = found if np.array_equal(used, found.used) else _fit(log, measured, used, near)
+def _fitted(log: Log, measured: MoveMeasurements, near: Near) -> tuple[_Fit, _Fit]:
+    """The fit of all moves that did not clip, and that without outliers: disturbed moves widen the variance of all."""
+    used = ~measured.is_lost
+    whole = found = _fit(log, measured, used, near)
     while True:
         observed = found.solution.observed
         far = np.isin(measured.links[:, 0], observed.before[far_moves(found.solution, len(observed.before))])
-        if not np.any(used & far) or not is_enough(used & ~far):
-            return found
+        # Outliers are told where the other moves overdetermine the gyro's scale.
+        if not np.any(used & far) or 2 * np.count_nonzero(used & ~far) <= N_GYROSCOPE + 2:
+            return whole, found
         used = used & ~far
         found = _fit(log, measured, used, near)
 
 
 def _fit(log: Log, measured: MoveMeasurements, used: BoolArray, near: Near) -> _Fit:
     return _Fit(log, measured, used, solve_session(log.observed(measured, used, near), *near))
-
-
-def _denied(found: _Fit) -> BoolArray:
-    """Moves (m,) whose tilt error exceeds its noise and the uncertainty of the fit at ``FALSE_ALARM``."""
-    residual, noise, slope = found.seen.in_plane()
-    of_fit = slope @ found.solution.covariance[12:21, 12:21] @ np.swapaxes(slope, 1, 2)
-    covariance = found.solution.inflation[0] ** 2 * noise + of_fit
-    distance = np.einsum("mi,mij,mj->m", residual, np.linalg.inv(covariance), residual)
-    out: BoolArray = distance > chdtri(2, FALSE_ALARM / len(distance))
-    return out
 
 
 def beside_given(accelerometer: SensorCalibration, found: SolvedSession) -> SensorCalibration:
@@ -178,20 +165,14 @@ def beside_given(accelerometer: SensorCalibration, found: SolvedSession) -> Sens
     return replace(found.gyroscope, covariance=found.gyroscope.covariance + by_given)
 
 
-def _losses(log: Log, found: _Fit) -> PossibleLosses:
-    """Undetected lost samples that may explain the tilt errors."""
-    sampling, solution, measured = log.recording.sampling, found.solution, found.measured
+def _losses(log: Log, whole: _Fit, found: _Fit) -> PossibleLosses:
+    """Undetected lost samples that may explain the tilt errors: a move that lost samples is an outlier among those that
+    lost none, so that the fit of the ``whole`` session is asked."""
+    sampling, fitted = log.recording.sampling, found.solution
     shows_losses = sampling.is_even and sampling.has_own_clock
-    if shows_losses or not could_be_remade(log.recording.time_s, measured.nominal_step_s):
+    if shows_losses or not could_be_remade(log.recording.time_s, found.measured.nominal_step_s):
         return PossibleLosses()
-    if found.outliers:
-        # A move that lost samples is an outlier among those that lost none.
-        near = solution.S_a, solution.b_a, solution.S_w
-        observed = log.observed(measured, ~measured.is_lost, near)
-        is_steady = not solution.observed.causes
-        solution = refitted(observed, solution) if is_steady else solve_session(observed, *near)
-    losses = possible_losses(log.recording, log.segments, solution.core)
-    fitted = found.solution
+    losses = possible_losses(log.recording, log.segments, whole.solution.core)
     if fitted.moves_dof < 1.0 or fdtrc(fitted.moves_dof, NOISE_DOF, fitted.moves_chi2 / fitted.moves_dof) > FALSE_ALARM:
         return losses
     return replace(losses, scatter=_mean_square(log, found) / fitted.inflation[0] ** 2)

@@ -1,4 +1,4 @@
-"""Initial values for the fit of a session, without outlier moves."""
+"""Initial values for the fit of a session."""
 
 import math
 from dataclasses import dataclass
@@ -9,8 +9,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.carried import N_GYROSCOPE, Carried, carried
-from trihedron.estimate.session.fit import are_far, usual_miss
+from trihedron.estimate.session.carried import Carried, carried
 from trihedron.estimate.session.observed import Near, Observed, arranged, with_prior
 from trihedron.quantiles import median
 from trihedron.records import Recording, Segments, SensorCalibration
@@ -21,8 +20,6 @@ from trihedron.units import rate_to_si
 ASTRAY_DEG = 5.0
 """Median tilt error that shows a wrong minimum: there half of a dozen moves are off by 10°; of the real recordings none
 has a median of 2° (`benches/recordings.py`)."""
-CAUCHY = 3.0
-"""Distance, in usual ones, at which a move has half the weight in the robust fit (Cauchy)."""
 ROUNDS = 20
 """Iterations of the weights: they converge in ten."""
 USUAL_RAD = 0.03
@@ -73,34 +70,6 @@ def lower(S: FloatArray, b: FloatArray) -> Near:
     """S and b of an accelerometer in the lower-triangular frame, and the rotation (3, 3) into it."""
     R = reframing(S, b, "lower").rotation
     return np.tril(R @ S), R @ b, R
-
-
-def near_one_another(log: Log, measured: MoveMeasurements, near: Near) -> BoolArray:
-    """Moves (m,) that are no outliers at a robust fit (Cauchy weights) of the gyro's scale.
-
-    With too few moves none is excluded.
-    """
-    used = ~measured.is_lost
-    residual, covariance, slope = log.carried(measured, near).in_plane()
-    used &= np.isfinite(residual).all(axis=1)
-    white = np.linalg.inv(np.linalg.cholesky(covariance[used]))
-    residual, slope = (white @ residual[used][:, :, None])[:, :, 0], white @ slope[used]
-    size = np.linalg.norm(slope, axis=(0, 1))
-    distance, usual = np.zeros(len(residual)), 1.0
-    for _ in range(ROUNDS):
-        root = (1.0 + distance / (CAUCHY**2 * usual))[:, None] ** -0.5
-        rows = (slope / size * root[:, :, None]).reshape(-1, 9)
-        step, _, rank, _ = np.linalg.lstsq(rows, -(residual * root).ravel(), rcond=1e-6)
-        distance = np.sum((residual + slope @ (step / size)) ** 2, axis=1)
-        usual = usual_miss(distance, 2.0 * len(distance) - rank)
-    out = used.copy()
-    out[used] = ~are_far(distance, 2.0 * len(distance) - rank)
-    return out if is_enough(out) else used
-
-
-def is_enough(used: BoolArray) -> bool:
-    """Whether the moves ``used`` (m,) overdetermine the gyro's scale, so that outliers can be identified."""
-    return 2 * int(np.count_nonzero(used)) > N_GYROSCOPE + 2
 
 
 def begun(log: Log, measured: MoveMeasurements) -> Near:
