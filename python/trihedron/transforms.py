@@ -32,8 +32,8 @@ def _turns(n: int) -> npt.NDArray[np.complex128]:
 
 
 def cross_matrix(v: FloatArray) -> FloatArray:
-    """(3, 3) matrix [v]× of the vector product with ``v`` (3,)."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    """(..., 3, 3) matrices [v]× of the vector product with ``v`` (..., 3)."""
+    return np.asarray(-np.cross(v[..., np.newaxis, :], np.eye(3)), dtype=np.float64)
 
 
 def rotation_by(vector: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from trihedron import probability
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray, rms_of
 from trihedron.estimate.accelerometer import face_poses, verdict
 from trihedron.estimate.accelerometer.face_poses import direction_of
-from trihedron.estimate.accelerometer.norm import checked_gravity, norm_residual, pose_means
+from trihedron.estimate.accelerometer.norm import checked_gravity, pose_means
 from trihedron.estimate.case_frame import (
     HEADING,
     TABLE,
@@ -24,6 +24,7 @@ from trihedron.estimate.case_frame import (
 )
 from trihedron.records import Finding, FitQuality, Observability, SensorCalibration, Severity
 from trihedron.records.words import words
+from trihedron.sensor_model import norms
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
 METHOD = "faces of the case on a level table, least squares"
@@ -184,12 +185,13 @@ def _quality(
     apart: FloatArray,
 ) -> FitQuality:
     """Norm residuals in sample and held out (NaN where no face), and χ² of the vectors."""
-    S, b = fitted
     residual, sigma = (np.full(len(is_face), np.nan) for _ in range(2))
-    g = float(seen.sizes[0])
-    residual[is_face], sigma[is_face] = norm_residual(seen.values @ S.T + b, S, seen.noise, g)
+    norm, slope = norms(seen.values, *fitted)
+    by_reading = slope[:, 9:] @ fitted[0]
+    residual[is_face] = norm - seen.sizes
+    sigma[is_face] = np.sqrt(np.einsum("ni,nij,nj->n", by_reading, seen.noise, by_reading))
     is_held, dof = np.isfinite(apart[:, 0]), fit.dof
-    floor = np.einsum("ij,njk,ik->", S, seen.noise, S) / (3 * len(seen.values))
+    floor = np.einsum("ij,njk,ik->", fitted[0], seen.noise, fitted[0]) / (3 * len(seen.values))
     return FitQuality(
         unit="m/s^2",
         residual=residual,

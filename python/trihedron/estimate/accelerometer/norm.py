@@ -144,20 +144,6 @@ def gravity_quality(
     )
 
 
-def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> tuple[FloatArray, FloatArray]:
-    """``|f| - |g|`` (n,) less its mean inflation by noise across gravity, and its standard error (n,), m/s² (eq. 12).
-
-    ``f`` (n, 3) are corrected means in m/s², ``noise`` (n, 3, 3) covariances of the raw means.
-    """
-    norm = np.linalg.norm(f, axis=1)
-    up = f / norm[:, None]
-    spread = np.einsum("ij,njk,lk->nil", S, noise, S)
-    total = np.trace(spread, axis1=1, axis2=2)
-    along = np.einsum("ni,nij,nj->n", up, spread, up)
-    sigma = np.sqrt(np.maximum(along, 1e-6 * total))
-    return norm - g - (total - along) / (2.0 * g), sigma
-
-
 # Checks of the arguments; errors name them in the user's words.
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases, shrink
 from trihedron.probability import chdtrc
 from trihedron.quantiles import MAD_TO_SIGMA, median
-from trihedron.ranges import rows_beside
+from trihedron.ranges import Range, rows_beside
 from trihedron.records import Move, Recording, Segments, SensorCalibration
 from trihedron.session.rounding import biases_by_codes, density_without_rounding, rounding_in_moves, undithered_axes
 
@@ -23,6 +24,8 @@ BESIDE = 2
 BLOCK_S = 0.5
 """Block length for the angle random walk: of the order of a move's duration, and long against the correlation of
 samples by an anti-alias filter."""
+FEWEST_BLOCKS = 8
+"""Fewest blocks that measure a noise, to a quarter of itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,30 +92,27 @@ class MoveMeasurements:
         )  # fmt: skip
 
 
-def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
-    """Angle random walk ``N`` of each raw axis in raw unit · √s, (3,), from block means inside the poses.
+def rate_noise_density(
+    recording: Recording, still: Sequence[Sequence[Range]], sigma: FloatArray | None = None
+) -> FloatArray:
+    """Angle random walk ``N`` of each raw axis in raw unit · √s, (3,), from block means in ``still`` parts of poses;
+    where these are too short, from the scatter ``sigma`` (3,) of samples, if given.
 
     ``N² = τ σ²(τ)`` with the Allan variance of blocks of τ = 0.5 s, pooled over the poses: unlike the scatter of single
     samples it is valid for filtered gyros, whose neighbouring samples are correlated. The lower limit is the rounding
-    of the ADC, ``LSB²/12`` per sample.
+    of the ADC, ``LSB²/12`` per sample, which also covers codes that a turn passes through. Raises ``InputError`` when
+    the poses are too short.
     """
-    gyroscope = recording.gyroscope
-    assert gyroscope is not None
+    assert recording.gyroscope is not None
     step_s = 1.0 / recording.rate_hz
-    kept = [(k, *part) for k, pose in enumerate(segments.poses) for part in pose.undisturbed()]
-    owner, *edges = np.array(kept, dtype=np.int64).reshape(-1, 3).T
+    kept = np.array([(k, *part) for k, parts in enumerate(still) for part in parts], dtype=np.int64).reshape(-1, 3)
     squares, count = _core.block_differences(
-        gyroscope, np.column_stack(edges), np.ascontiguousarray(owner), max(1, round(BLOCK_S / step_s))
+        recording.gyroscope, kept[:, 1:].copy(), kept[:, 0].copy(), max(1, round(BLOCK_S / step_s))
     )
-    sums = np.array(squares) * step_s
-    if count < 8 and segments.gyroscope_sigma is not None:
-        variance = np.asarray(segments.gyroscope_sigma) ** 2 * step_s
-    elif count:
-        variance = sums / count
-    else:
+    if count < FEWEST_BLOCKS and sigma is None:
         raise InputError("the poses are too short to measure the gyro's noise: keep each pose for at least a second")
-    converter = recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s
-    return np.sqrt(np.maximum(variance, converter))
+    variance = np.array(squares) / count if sigma is None or count >= FEWEST_BLOCKS else sigma**2
+    return np.asarray(np.sqrt(np.maximum(variance, recording.facts.of("gyroscope").step ** 2 / 12.0) * step_s))
 
 
 def measure_moves(recording: Recording, segments: Segments, accelerometer: SensorCalibration) -> MoveMeasurements:
@@ -153,7 +153,8 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         # At rest inside a move an axis reads as in the poses around it.
         for (first, last), pair in zip(edges, (of_codes - bias_read)[links], strict=True):
             rate[first:last] += hidden[first:last] * np.linspace(pair[0], pair[1], last - first)
-    seen = rate_noise_density(recording, segments)
+    still = [pose.undisturbed() for pose in segments.poses]
+    seen = rate_noise_density(recording, still, segments.gyroscope_sigma)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     nominal, jitter = _steps_of(recording)
     return MoveMeasurements(

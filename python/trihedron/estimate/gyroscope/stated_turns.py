@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron._core import block_differences, integrate_raw_rate
+from trihedron._core import integrate_raw_rate
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
-from trihedron.estimate.gyroscope.measurements import BLOCK_S
+from trihedron.estimate.gyroscope.measurements import rate_noise_density
 from trihedron.estimate.gyroscope.turn_rounding import hidden_angles
 from trihedron.estimate.gyroscope.turntable import StatedRates, moved_to, not_fitted, with_parameters
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri
@@ -247,15 +247,7 @@ def measure_turns(recording: Recording, turns: Sequence[Move], static: Sequence[
     raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
     static_edges = np.array(static, dtype=np.int64)
     static_angle, static_duration = integrate_raw_rate(recording.time_s, gyroscope, static_edges, 1)
-    squares, count = block_differences(
-        gyroscope, static_edges, np.arange(len(static_edges)), max(1, round(BLOCK_S / step_s))
-    )
-    if count < 4:
-        raise InputError(
-            "the stretches without rotation are too short to measure the gyro's noise: keep still for some seconds"
-        )
-    # At least the variance of rounding, which also covers codes that a turn passes through.
-    var_rate = np.maximum(np.array(squares) / count, quantum**2 / 12.0) * step_s
+    var_rate = rate_noise_density(recording, [[span] for span in static]) ** 2
     static_s = np.array(static_duration)[:, None]
     bias, _, spread = pool_biases(static_angle / static_s, var_rate / static_s)
     hidden = hidden_angles(gyroscope, step_s, quantum, edges, static_edges, raw_angle)

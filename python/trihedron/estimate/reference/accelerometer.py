@@ -12,6 +12,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.reference.coloured import Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference, Windows
 from trihedron.sensor_model import other_form, other_form_jacobian
+from trihedron.transforms import cross_matrix
 
 KNOWN = 0.05
 """Largest relative σ of S with which the fitted force is used: the relative error of g-sensitivity is the same."""
@@ -115,7 +116,7 @@ def _in_body(grid: Grid, reference: Reference, windows: Windows, time: FloatArra
         readings[:, i, 9 + i] = signals[:, 3]
 
     def rows(at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        omega = _cross(reference.rate(at))
+        omega = cross_matrix(reference.rate(at))
         by_arm = windows.of(windows.slope, omega) - windows.of(windows.weight, omega @ omega)
         return np.concatenate([readings, by_arm], axis=2), windows.of(windows.weight, reference.specific_force(at))
 
@@ -177,7 +178,7 @@ def _along_path(
     found = ForceFit(
         S, b, solution.covariance[:12, :12], up, up_covariance, arm, arm_covariance, solution,
         # An attitude error -ε changes the prediction (C S a' + ...) by -ε x itself.
-        np.einsum("nka,kab->nkb", influence, _cross(base @ own)), _wrt_clock(influence, left, time),
+        np.einsum("nka,kab->nkb", influence, cross_matrix(base @ own)), _wrt_clock(influence, left, time),
     )  # fmt: skip
     return found.with_error(np.outer(by_average, by_average))
 
@@ -257,7 +258,7 @@ def _under_gravity(
 
     return ForceFit(
         S, b, covariance, up, across @ solution.covariance[12:, 12:] @ across.T, None, None, in_si,
-        -np.einsum("nka,kab->nkb", influence, M @ back @ _cross(up[None])), _wrt_clock(influence, left, time),
+        -np.einsum("nka,kab->nkb", influence, M @ back @ cross_matrix(up[None])), _wrt_clock(influence, left, time),
     )  # fmt: skip
 
 
@@ -302,9 +303,3 @@ def _reject_mirror(reference: Reference, determinant: float, handedness: float) 
 def _across(up: FloatArray) -> FloatArray:
     """(3, 2) orthonormal vectors perpendicular to ``up`` (3,)."""
     return np.asarray(np.linalg.svd(up[None, :])[2][1:].T, dtype=np.float64)
-
-
-def _cross(v: FloatArray) -> FloatArray:
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return out - np.swapaxes(out, 1, 2)

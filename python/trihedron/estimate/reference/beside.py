@@ -7,8 +7,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from trihedron._core import ReferenceLog, rotation_from_vector
+from trihedron._core import ReferenceLog
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.reference.likelihood import Problem
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.gravity import EARTH_RATE_RAD_S
@@ -217,13 +218,7 @@ class Beside:
         else:
             assert motion.rate is not None
             time, rate = (motion.time_s - point.offset_s) / (1.0 + point.rate), motion.rate
-        rate, h = rate @ point.mounting, np.diff(time)[:, None]
-        turn = 0.5 * h * (rate[1:] + rate[:-1]) + h**2 / 12.0 * np.cross(rate[:-1], rate[1:])
-        out = np.empty((len(time), 3, 3))
-        out[0] = now = np.eye(3)
-        for k, step in enumerate(rotation_from_vector(np.ascontiguousarray(turn))):
-            out[k + 1] = now = now @ step
-        return time, out
+        return time, integrate_rate(time, rate @ point.mounting)
 
 
 def places(sides: list[Beside], wanted: tuple[str, ...]) -> list[dict[str, IntArray]]:

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron._core import rolling_mean
 from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.errors import InputError
-from trihedron.estimate.reference.together import Grid, Reference, running_mean
+from trihedron.estimate.reference.together import Grid, Reference
 
 LEAST_CORRELATION = 0.7
 """Least correlation of shared motion: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a thousand reaches
@@ -70,7 +71,7 @@ def _size_of_rate(grid: Grid) -> FloatArray:
 def _reference_size(reference: Reference, t: FloatArray, step: float) -> FloatArray:
     """(n,) magnitude of the reference's rate at times (n,) ``step`` apart; NaN where it has no rows."""
     # The differentiated noise of a tracker exceeds the motion unless it is averaged.
-    rate = running_mean(reference.rate(t), max(1, round(0.1 / step)))
+    rate = rolling_mean(reference.rate(t), max(1, round(0.1 / step)))
     size = np.linalg.norm(rate, axis=1)
     size[~reference.covers(t)] = np.nan
     return np.asarray(size, dtype=np.float64)

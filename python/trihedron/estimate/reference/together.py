@@ -6,6 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from trihedron._core import rolling_mean
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.quantiles import MAD_TO_SIGMA
@@ -140,20 +141,12 @@ def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> BoolArray:
         later = raw[len(raw) // 3 :]
         level = np.median(later, axis=0)
         sigma = MAD_TO_SIGMA * np.median(np.abs(later - level), axis=0) + 1e-12 * np.abs(level).max() + TINY
-        smooth = running_mean(np.abs(raw - level) / sigma, max(guard // 2, 1))
+        smooth = rolling_mean(np.abs(raw - level) / sigma, max(guard // 2, 1))
         off = np.flatnonzero(np.any(smooth > LEVELS, axis=1))
         begin = off[off < len(raw) // 3]
         first = int(begin[-1]) + guard if len(begin) else 0
         out[inside[first:]] = True
     return out
-
-
-def running_mean(x: FloatArray, n: int) -> FloatArray:
-    """Centred means (k, c) of ``n`` rows of ``x`` (k, c), of fewer at its ends."""
-    total = np.cumsum(np.vstack([np.zeros((1, x.shape[1])), x]), axis=0)
-    at = np.arange(len(x))
-    low, high = np.maximum(at - n // 2, 0), np.minimum(at - n // 2 + n, len(x))
-    return np.asarray((total[high] - total[low]) / np.maximum(high - low, 1)[:, None])
 
 
 # Comparison without differentiation: both sides are weighted by the same smooth windows (modulating functions).

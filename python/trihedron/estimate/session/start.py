@@ -203,5 +203,5 @@ def _equations(moments: list[FloatArray]) -> FloatArray:
     return np.moveaxis(_ACROSS @ np.array(moments)[:, None], 1, 2).reshape(-1, 3, 9)
 
 
-_ACROSS = -np.array([cross_matrix(axis) for axis in np.eye(3)])
+_ACROSS = -cross_matrix(np.eye(3))
 """(3, 3, 3) matrix [i] that multiplies ``f`` to give ``f × e_i``."""
