@@ -8,7 +8,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import yaml
-from scipy.signal import lfilter
 
 import trihedron
 from small_session import rejected
@@ -19,14 +18,12 @@ from trihedron.files.formats import ExportOptions, NoiseFigure, SensorNoise, exp
 
 RATE, STEPS = 200.0, 1000
 DT = 1.0 / RATE
-SIM_RATE, SECONDS, G = 100.0, 1000, 9.81
+SIM_RATE = 100.0
 WHITE, WALK = {"accelerometer": 2e-3, "gyroscope": 1e-4}, {"accelerometer": 4e-4, "gyroscope": 2e-5}
 OPTIONS = ExportOptions(
     *(SensorNoise(NoiseFigure(WHITE[s]), NoiseFigure(WALK[s])) for s in ("accelerometer", "gyroscope")),
     rate_hz=SIM_RATE,
 )
-N = int(SIM_RATE * SECONDS)
-TRUTH = {"accelerometer": np.tile([0.0, 0.0, G], (N, 1)), "gyroscope": np.zeros((N, 3))}
 
 
 def orb_slam3(text):
@@ -132,41 +129,27 @@ def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
     assert "It moves." in capsys.readouterr().err
 
 
-def walk(rng, n, step, keep=1.0):
-    """(n, 3): b[k] = keep b[k-1] + N(0, step²), from zero."""
-    return lfilter([1.0], [1.0, -keep], step * rng.standard_normal((n, 3)), axis=0)
-
-
-def gazebo(text, rng, truth):
+def gazebo(text):
     root = ElementTree.fromstring(text)
     dt = 1.0 / float(root.find("update_rate").text)
-    out = {}
-    for element, name in (("angular_velocity", "gyroscope"), ("linear_acceleration", "accelerometer")):
-        columns = []
-        for axis in "xyz":
-            p = {one.tag: float(one.text) for one in root.find(f"imu/{element}/{axis}/noise")}
-            tau, sigma = p["dynamic_bias_correlation_time"], p["dynamic_bias_stddev"]
-            step = np.sqrt(-(sigma**2) * tau / 2 * np.expm1(-2 * dt / tau))
-            slow = walk(rng, len(truth[name]), step, np.exp(-dt / tau))[:, 0]
-            columns.append(slow + rng.normal(p["mean"], p["stddev"], len(slow)))
-        out[name] = truth[name] + np.array(columns).T
-    return out
+    for element in ("linear_acceleration", "angular_velocity"):
+        axes = [{one.tag: float(one.text) for one in root.find(f"imu/{element}/{axis}/noise")} for axis in "xyz"]
+        p = {tag: np.array([axis[tag] for axis in axes]) for tag in axes[0]}
+        tau = p["dynamic_bias_correlation_time"]
+        step = np.sqrt(-(p["dynamic_bias_stddev"] ** 2) * tau / 2 * np.expm1(-2 * dt / tau))
+        yield p["stddev"], step, np.exp(-dt / tau), np.eye(3), p["mean"]
 
 
-def gnss_ins_sim(text, rng, truth):
+def gnss_ins_sim(text):
     scope: dict = {}
     exec(text, scope)
-    e, dt = scope["imu_err"], 1.0 / scope["FS"]
-    hour = np.radians(1) / 3600
-    sizes = {
-        "gyroscope": (e["gyro_b"] * hour, e["gyro_b_stability"] * hour, np.radians(e["gyro_arw"]) / 60, "gyro_b_corr"),
-        "accelerometer": (e["accel_b"], e["accel_b_stability"], e["accel_vrw"] / 60, "accel_b_corr"),
-    }
-    out = {}
-    for name, (b, drift, white, corr) in sizes.items():
-        slow = walk(rng, len(truth[name]), dt * drift, 1 - dt / e[corr][0])
-        out[name] = truth[name] + b + slow + white / np.sqrt(dt) * rng.standard_normal(truth[name].shape)
-    return out
+    e, root = scope["imu_err"], np.sqrt(scope["FS"])
+    for sensor, white, unit in (
+        ("accel", e["accel_vrw"], 1.0),
+        ("gyro", np.radians(e["gyro_arw"]), np.radians(1) / 3600),
+    ):
+        b, drift, corr = (e[f"{sensor}_b{kind}"] for kind in ("", "_stability", "_corr"))
+        yield white / 60 * root, unit * drift / root**2, 1 - 1 / root**2 / corr, np.eye(3), unit * b
 
 
 def matlab(text, name):
@@ -175,51 +158,36 @@ def matlab(text, name):
     return {key: np.array([float(v) for v in re.findall(r"[-+\d.e]+", value)]) for key, value in found.items()}
 
 
-def imusensor(text, rng, truth):
-    out = {}
-    for attribute, name in (("Accelerometer", "accelerometer"), ("Gyroscope", "gyroscope")):
+def imusensor(text):
+    for attribute in ("Accelerometer", "Gyroscope"):
         p = matlab(text, attribute)
-        A = p["AxesMisalignment"].reshape(3, 3) / 100.0
-        white = p["NoiseDensity"] * np.sqrt(SIM_RATE) * rng.standard_normal(truth[name].shape)
-        slow = walk(rng, len(truth[name]), p["RandomWalk"] / np.sqrt(SIM_RATE))
-        out[name] = truth[name] @ A.T + p["ConstantBias"] + white + slow
-    return out
+        white, step = p["NoiseDensity"] * np.sqrt(SIM_RATE), p["RandomWalk"] / np.sqrt(SIM_RATE)
+        yield white, step, 1.0, p["AxesMisalignment"].reshape(3, 3) / 100.0, p["ConstantBias"]
 
 
-def airsim(text, rng, truth):
-    s, dt = json.loads(text)["Sensors"]["Imu"], 1.0 / SIM_RATE
-    gyro = np.radians(s["AngularRandomWalk"]) / 60, np.radians(s["GyroBiasStability"]) / 3600, s["GyroBiasStabilityTau"]
+def airsim(text):
+    s, root = json.loads(text)["Sensors"]["Imu"], np.sqrt(SIM_RATE)
     accel = 9.80665e-3 * s["VelocityRandomWalk"], 9.80665e-6 * s["AccelBiasStability"], s["AccelBiasStabilityTau"]
-    out = {}
-    for name, (white, stability, tau) in (("gyroscope", gyro), ("accelerometer", accel)):
-        slow = walk(rng, len(truth[name]), stability / np.sqrt(tau) * np.sqrt(dt))
-        out[name] = truth[name] + white / np.sqrt(dt) * rng.standard_normal(truth[name].shape) + slow
-    return out
+    gyro = np.radians(s["AngularRandomWalk"]) / 60, np.radians(s["GyroBiasStability"]) / 3600, s["GyroBiasStabilityTau"]
+    for white, stability, tau in (accel, gyro):
+        yield white * root, stability / np.sqrt(tau) / root, 1.0, np.eye(3), np.zeros(3)
 
 
-def mvsim(text, rng, truth):
+def mvsim(text):
     p = {one.tag: float(one.text) for one in ElementTree.fromstring(text)}
-    dt = p["sensor_period"]
-    words = {"gyroscope": "angular_velocity", "accelerometer": "linear_acceleration"}
-    return {
-        name: truth[name]
-        + walk(rng, len(truth[name]), p[f"{word}_random_walk_std_noise"] * np.sqrt(dt))
-        + p[f"{word}_white_noise_std_noise"] * rng.standard_normal(truth[name].shape)
-        for name, word in words.items()
-    }
+    for word in ("linear_acceleration", "angular_velocity"):
+        step = p[f"{word}_random_walk_std_noise"] * np.sqrt(p["sensor_period"])
+        yield p[f"{word}_white_noise_std_noise"], step, 1.0, np.eye(3), np.zeros(3)
 
 
-def isaac(text, rng, truth):
+def isaac(text):
     """Isaac Lab's gaussian_noise of operation "add", then the scale of the observation."""
     lines = [line for line in text.splitlines() if "import" not in line]
     scope = {"torch": SimpleNamespace(tensor=np.array), "GaussianNoiseCfg": SimpleNamespace}
     exec("\n".join(lines), scope)
-    out = {}
-    for name, term in (("gyroscope", scope["IMU_ANG_VEL"]), ("accelerometer", scope["IMU_LIN_ACC"])):
-        noise = term["noise"]
-        readings = truth[name] + noise.mean + noise.std * rng.standard_normal(truth[name].shape)
-        out[name] = readings * np.array(term["scale"])
-    return out
+    for term in (scope["IMU_LIN_ACC"], scope["IMU_ANG_VEL"]):
+        noise, scale = term["noise"], np.array(term["scale"])
+        yield noise.std * scale, 0.0, 1.0, np.diag(scale), noise.mean * scale
 
 
 LAWS = {"gazebo": gazebo, "gnss-ins-sim": gnss_ins_sim, "imusensor": imusensor}
@@ -230,31 +198,17 @@ LAWS |= {"isaac": isaac, "airsim": airsim, "mvsim": mvsim}
 def test_the_simulators_own_law_gives_the_noise_of_the_unit(target):
     known = calibration("si")
     text = export_files(known, target, OPTIONS)[""]
-    made = LAWS[target](text, np.random.default_rng(7), TRUTH)
-    log = {"t": np.arange(N) / SIM_RATE, "acc": made["accelerometer"], "gyr": made["gyroscope"]}
-    noise = trihedron.allan(trihedron.read(log, accelerometer_unit="m/s^2", gyroscope_unit="rad/s"))
-    for axis in noise.axes:
-        name = "accelerometer" if axis.unit == "m/s^2" else "gyroscope"
-        terms = axis.terms
-        # 100 000 samples know N to 0.3 %, 1000 s know K to 15 to 25 %.
-        assert terms["N"].value == pytest.approx(WHITE[name], rel=0.02), (target, axis)
-        if target == "isaac":
-            assert f"The walk of the {name}'s bias cannot be held" in text
-        else:
-            assert terms["K"].value == pytest.approx(WALK[name], rel=0.5), (target, axis)
-    for name in TRUTH:
+    # Of each sensor: white noise of a sample, the step of the bias, the share of it that is kept, matrix and bias.
+    for name, (white, step, keep, held, bias) in zip(WHITE, LAWS[target](text), strict=True):
         A = np.linalg.inv(getattr(known, name).S)
-        b = -A @ getattr(known, name).b
-        reading = made[name][: int(SIM_RATE)].mean(axis=0) - TRUTH[name][0]
-        if target in ("imusensor", "isaac"):
-            held = A if target == "imusensor" else np.diag(np.diag(A))
-            wanted = held @ TRUTH[name][0] + b - TRUTH[name][0]
-        elif target in ("airsim", "mvsim"):
-            assert f"bias of the {name} cannot be held" in text
-            wanted = np.zeros(3)
-        else:
-            wanted = b
-            assert f"misalignment of the {name} cannot be held" in text
-        # One second of white noise, and a second of walk.
-        tolerance = 6 * np.hypot(WHITE[name], WALK[name])
-        np.testing.assert_allclose(reading, wanted, atol=tolerance)
+        without_walk, without_bias = target == "isaac", target in ("airsim", "mvsim")
+        holds = {"imusensor": A, "isaac": np.diag(np.diag(A))}.get(target, np.eye(3))
+        np.testing.assert_allclose(white, WHITE[name] * np.sqrt(SIM_RATE), rtol=1e-9)
+        # A correlation time of 10⁶ s takes less than that of a step.
+        np.testing.assert_allclose(step, 0.0 if without_walk else WALK[name] / np.sqrt(SIM_RATE), rtol=1e-6)
+        assert np.all((1.0 - keep) * SIM_RATE < 1e-5)
+        np.testing.assert_allclose(held, holds, **ROUNDING)
+        np.testing.assert_allclose(bias, 0.0 if without_bias else -A @ getattr(known, name).b, **ROUNDING)
+        assert (f"The walk of the {name}'s bias cannot be held" in text) == without_walk
+        assert (f"bias of the {name} cannot be held" in text) == without_bias
+        assert (f"misalignment of the {name} cannot be held" in text) == (target not in ("imusensor", "isaac"))

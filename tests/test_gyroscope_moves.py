@@ -45,20 +45,6 @@ def quiet():
     return recording, truth, segments_from_truth(recording, truth)
 
 
-@pytest.mark.parametrize("sessions", [12, pytest.param(25, marks=pytest.mark.slow)])
-def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate(sessions):
-    scores = []
-    for seed in range(sessions):
-        recording, truth = simulate(scenario(hand_session(12, pose_s=2.0, first_pose_s=3.0)), seed)
-        found, _ = calibrated(recording, segments_from_truth(recording, truth), truth)
-        scores.append(z_scores(found, truth))
-    scores = np.array(scores)
-    # 12 scores a session; the parameters of one run are correlated, so count 6 independent ones: three binomial sigmas.
-    for level, expected in ((1.0, 0.683), (1.96, 0.95)):
-        margin = 3.0 * np.sqrt(expected * (1.0 - expected) / (6 * sessions))
-        assert abs(np.mean(np.abs(scores) < level) - expected) < margin
-
-
 @pytest.mark.parametrize("draws", [5, pytest.param(12, marks=pytest.mark.slow)])
 def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_own(draws):
     rng = np.random.default_rng(7)

@@ -159,14 +159,6 @@ def test_noise_that_alternates_and_readings_that_toggle_between_two_steps_are_on
     assert "devices-interleaved" not in serious(recording)
 
 
-def test_axes_swapped_in_the_middle_of_a_log_are_serious(tmp_path):
-    t, force, rate = motion(n_poses=16)
-    at = round(0.3 * len(t))
-    rate[at:] = rate[at:, [1, 2, 0]]
-    swapped = read_recording(written(tmp_path / "log.csv", *table(t, force, rate)))
-    assert "axes-changed" in serious(swapped)
-
-
 def test_axes_of_both_sensors_that_turn_while_the_part_rests_are_serious(tmp_path):
     t, force, rate = motion(n_poses=16)
     # Poses of two seconds every 3.2 s or so: the first row, from a third of the log on, in the middle of one.

@@ -131,17 +131,10 @@ def test_rows_in_turn_without_a_time_are_refused_and_lost_readings_stay_lost(tmp
     np.testing.assert_array_equal(recording.gyroscope, lost[:, 4:])
 
 
-def test_rows_are_put_in_order_and_arrays_of_the_caller_stay_as_they_were(tmp_path):
-    # Rows at 1 kHz of which some stand up to five places late.
-    n, rng = 5000, np.random.default_rng(0)
-    ordered = np.column_stack([np.arange(n) / 1000.0, rng.normal(9.8, 0.02, (n, 3)), rng.normal(0.0, 0.002, (n, 3))])
-    given = ordered[np.argsort(np.arange(n) + np.where(rng.random(n) < 1e-2, 5.5, 0.0), kind="stable")]
-    path = tmp_path / "log.csv"
-    np.savetxt(path, given, delimiter=",", header="time [s],ax,ay,az,gx,gy,gz", comments="", fmt="%.6f")
-    recording = trihedron.read(path)
-    assert "time-backward" in {finding.code for finding in recording.findings}
-    np.testing.assert_allclose(recording.accelerometer, ordered[:, 1:4], atol=1e-6)
-    np.testing.assert_allclose(recording.gyroscope, ordered[:, 4:], atol=1e-6)
+def test_rows_are_put_in_order_and_arrays_of_the_caller_stay_as_they_were():
+    # Rows of which some stand up to five places late.
+    rng, ordered = np.random.default_rng(0), readings(ROWS)
+    given = ordered[np.argsort(np.arange(ROWS) + np.where(rng.random(ROWS) < 1e-2, 5.5, 0.0), kind="stable")]
     force, rate = np.ascontiguousarray(given[:, 1:4]), np.ascontiguousarray(given[:, 4:])
     before = force.copy(), rate.copy()
     recording = trihedron.read({"t": given[:, 0].copy(), "acc": force, "gyr": rate})
