@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-from pathlib import Path
 
 import numpy as np
 import polars
@@ -177,20 +176,6 @@ def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):
     common = one + np.repeat([0.0, 0.05, 0.0], [12, 3, 6])
     rows = [row("logs", str(k), (one, common)[k % 2] + repeats[k], sigma) for k in range(4)]
     assert summarise(rows, tmp_path).summary.mixed == ()
-
-
-def test_what_is_no_file_has_a_row_and_its_reason(logs, tmp_path):
-    folder = tmp_path / "logs"
-    (folder / "log_1.csv").mkdir(parents=True)
-    os.mkfifo(folder / "log_2.csv")
-    (folder / "log_3.csv").write_bytes((logs / "unit_0" / "log_0.csv").read_bytes())
-    for source in (folder, str(folder / "*.csv")):
-        rows = trihedron.fleet(source, tmp_path / "out", workers=0, diagnose=False, gravity_m_s2=G).rows
-        said = {Path(row["path"]).name: (row["status"], row["reason"]) for row in rows}
-        assert said["log_3.csv"][0] == "done"
-        assert said["log_2.csv"][0] == "rejected"
-        assert "pipe" in said["log_2.csv"][1]
-        assert "a folder without logs" in said["log_1.csv"][1]
 
 
 @pytest.mark.filterwarnings("ignore")

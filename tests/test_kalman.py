@@ -179,24 +179,6 @@ def test_wrong_noise_shows_in_the_innovations_and_right_noise_does_not(true, bel
         assert reported[code] >= 27
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"start_s": np.zeros(324)}, "in order of time"),
-        ({"start_s": np.zeros(3)}, "like the references"),
-        ({"noise": AxisNoise()}, "believed exactly"),
-        ({"noise": [AxisNoise(white=1.0)] * 2}, "one axis or three"),
-        ({"readings": np.full((324, 3), np.nan)}, "must be finite"),
-        ({"readings": np.zeros((10, 3))}, "one row per pose"),
-    ],
-)
-def test_malformed_questions_are_refused_in_plain_words(change, message):
-    table, readings, start, pose = article_readings(14, ARTICLE_MIX)
-    asked = {"readings": readings, "table": table, "noise": ARTICLE_MIX, "start_s": start, "pose_s": pose} | change
-    with pytest.raises(ValueError, match=message):
-        calibrate_with_references(**asked)
-
-
 def test_the_pose_from_which_innovations_are_beyond_chance_is_named():
     """A reference that slips is wrong from one pose on."""
     z = np.random.default_rng(3).normal(size=24)

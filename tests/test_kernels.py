@@ -182,15 +182,6 @@ def test_a_shift_reads_the_clamped_spline_of_every_move(ahead_s):
     assert np.abs(_core.move_shifted(TIME, VALUES, MOVES, ahead_s) - expected).max() < 1e-11
 
 
-def test_moves_beyond_the_values_are_refused():
-    with pytest.raises(ValueError, match="within 90 points"):
-        _core.move_derivative(TIME, VALUES, np.array([[80, 91]]))
-    with pytest.raises(ValueError, match="as many times"):
-        _core.move_shifted(TIME[1:], VALUES, MOVES, 0.01)
-    with pytest.raises(ValueError, match="positive"):
-        _core.play(VALUES, 0.0)
-
-
 def test_distributions_are_those_of_scipy_and_the_tail_of_chi_square_is_the_inverse_of_its_limit():
     for name, *given in DISTRIBUTIONS:
         expected = getattr(special, name)(*given)

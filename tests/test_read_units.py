@@ -1,6 +1,7 @@
-"""Column names, units and the order of columns: by what names mean, and by what the readings can only be."""
+"""Column names, units and order by what names mean and readings can only be; a temperature; axes that change."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -273,3 +274,88 @@ def test_the_one_move_of_a_static_log_decides_no_unit():
     found = turning_of(a, w, RATE_HZ)
     assert found.correlation > 0.5
     assert not found.is_clear
+
+
+T_DEGC = np.round(np.linspace(22.0, 28.0, 1650), 2)
+
+
+def read_with(name, values):
+    t, force, rate = motion(50.0, n_poses=8)
+    columns = {"time_s": t, "acc": force, "gyr": rate, name: np.resize(values, len(t))}
+    recording = trihedron.read(columns)
+    return recording.temperature_degc, {f.code: f for f in recording.findings}
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("temperature [degC]", T_DEGC),
+        ("temp_C", T_DEGC),
+        ("temperature [K]", T_DEGC + 273.15),
+        ("temp_K", T_DEGC + 273.15),
+        ("temperature (°F)", T_DEGC * 1.8 + 32.0),
+        ("temp_F", T_DEGC * 1.8 + 32.0),
+    ],
+)
+def test_a_temperature_is_converted_from_the_unit_of_its_name(name, values):
+    found, findings = read_with(name, values)
+    np.testing.assert_allclose(found, np.resize(T_DEGC, len(found)), atol=1e-9)
+    assert "temperature-implausible" not in findings
+
+
+@pytest.mark.parametrize("values", [T_DEGC + 273.15, 10.0 * T_DEGC, (T_DEGC - 36.53) * 340.0])
+def test_a_column_that_is_not_in_degrees_celsius_is_not_used(values):
+    found, findings = read_with("temp", values)
+    assert found is None
+    assert "not used" in findings["temperature-implausible"].action
+
+
+def test_readings_of_a_thermometer_that_does_not_answer_are_left_out():
+    values = T_DEGC.copy()
+    values[::37] = -127.0
+    found, findings = read_with("temp_C", values)
+    assert np.isnan(found[::37][:40]).all()
+    assert np.nanmin(found) == 22.0
+    assert "temperature-implausible" in findings
+
+
+FLIP_Y = np.diag([1.0, -1.0, 1.0])
+EXCHANGE = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def changes(change, sensor, at=0.5, seed=1):
+    """Findings on a log whose readings of one sensor are multiplied by ``change`` (3, 3) from a part of it on."""
+    t, force, rate = motion(50.0, seed, n_poses=14)
+    k = round(at * len(t))
+    readings = {"acc": force, "gyr": rate}
+    readings[sensor][k:] = readings[sensor][k:] @ np.asarray(change).T
+    found = trihedron.read({"time_s": t, **readings}).findings
+    return t[k], [f for f in found if f.severity is Severity.SERIOUS]
+
+
+@pytest.mark.parametrize("at", [0.3, 0.5, 0.75])
+@pytest.mark.parametrize(
+    ("sensor", "change", "words"),
+    [
+        ("gyr", FLIP_Y, r"axes of the gyro change .* Y reads what −Y read"),
+        ("acc", FLIP_Y, "axes of the accelerometer change .* Y reads what −Y read"),
+        ("gyr", EXCHANGE, "axes of the gyro change .* X reads what Y read, Y reads what X read"),
+        ("gyr", 2.0 * np.eye(3), "scale of the gyro changes .* reads 2 times"),
+        ("acc", 0.5 * np.eye(3), "scale of the accelerometer changes .* reads 0.5 times"),
+    ],
+)
+def test_axes_or_a_scale_that_change_inside_a_log_are_one_serious_finding_with_axis_and_time(at, sensor, change, words):
+    at_s, found = changes(change, sensor, at)
+    (one,) = found
+    assert one.code == "axes-changed"
+    assert re.search(words, one.seen)
+    # Poses of 2.5 s and moves of 1.5 s: a move that the change leaves as it is lies on either side.
+    assert one.numbers["from_s"] - 4.0 <= at_s <= one.numbers["to_s"] + 4.0
+    assert one.numbers["to_s"] - one.numbers["from_s"] < 8.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_axes_that_do_not_change_are_not_reported(seed):
+    assert not changes(np.eye(3), "gyr", seed=seed)[1]
+    # Axes of other directions than the names say are alike throughout.
+    assert not changes(EXCHANGE, "gyr", 0.0, seed)[1]
