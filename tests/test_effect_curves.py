@@ -5,13 +5,13 @@ import inspect
 import re
 import textwrap
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from diagnosed_session import diagnosed, nearest_pose, simulated
+from test_architecture import PACKAGE, nodes
 from trihedron.api.diagnosing import diagnose
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
@@ -101,7 +101,6 @@ def test_a_vertical_part_that_is_not_seen_leaves_the_latitude_to_the_horizontal_
     assert np.degrees(near.latitude_std) < 15.0
 
 
-DIAGNOSE = Path(__file__).parents[1] / "python" / "trihedron" / "diagnose"
 # Effects of the package: other tests may have added their own.
 OURS = [effect for effect in catalogue() if type(effect).__module__.startswith("trihedron.")]
 
@@ -139,8 +138,8 @@ def test_an_effect_asks_for_exactly_the_sentences_and_places_of_the_catalogue():
 
 def test_every_reason_is_given_somewhere_and_with_its_places():
     given = {}
-    for path in DIAGNOSE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
+    for path in (PACKAGE / "diagnose").rglob("*.py"):
+        for node in nodes(path):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "why_not":
                 name = node.args[0].value
                 given[name] = {keyword.arg for keyword in node.keywords}

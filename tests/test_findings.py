@@ -4,11 +4,11 @@ import ast
 import itertools
 import re
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from test_architecture import PACKAGE, no_search_for_garbage, nodes  # noqa: F401
 from trihedron.records import Finding, Severity
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
@@ -17,8 +17,6 @@ from trihedron.report.findings.phrases import PHRASES
 from trihedron.report.findings.wording import filled, places
 from trihedron.report.in_python import in_python
 
-PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
-
 
 @cache
 def _calls(attribute):
@@ -26,9 +24,7 @@ def _calls(attribute):
     found = []
     for path in sorted(PACKAGE.rglob("*.py")):
         name = str(path.relative_to(PACKAGE))
-        if name.startswith("report/") or "Finding" not in (text := path.read_text()):
-            continue
-        for node in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)):
+        for node in (node for node in nodes(path) if isinstance(node, ast.Call) and not name.startswith("report/")):
             called = node.func
             if isinstance(called, ast.Attribute) and isinstance(called.value, ast.Name):
                 is_one = attribute and called.value.id == "Finding" and called.attr == "of"
@@ -95,7 +91,7 @@ def test_no_stage_looks_for_a_code_that_no_finding_has():
     # Effects have codes' form, and some have a finding of the same name.
     known = codes | set(EFFECTS)
     for path in sorted(PACKAGE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in (one for one in nodes(path) if isinstance(one, ast.Compare | ast.Set)):
             compared = isinstance(node, ast.Compare) and getattr(node.left, "attr", "") == "code"
             group = "elts" if isinstance(node, ast.Set) else "comparators" if compared else ""
             # What is compared with is a literal, or a collection of them.
@@ -152,7 +148,7 @@ def test_in_python_a_sentence_names_parameters_and_a_command_stays_a_command():
 
 def test_every_phrase_of_a_stage_is_in_the_catalogue_with_its_places_and_every_phrase_is_used():
     for path in sorted(PACKAGE.rglob("*.py")):
-        for node in (one for one in ast.walk(ast.parse(path.read_text())) if isinstance(one, ast.Call)):
+        for node in (one for one in nodes(path) if isinstance(one, ast.Call)):
             if not (isinstance(node.func, ast.Name) and node.func.id in {"words", "remarked"}):
                 continue
             name = node.args[-1]

@@ -9,18 +9,16 @@ import inspect
 import json
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 import typer
 
 import trihedron
+from test_architecture import PACKAGE, ROOT, no_search_for_garbage, nodes  # noqa: F401
 from trihedron.cli import COMMANDS, build_app
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 from trihedron.report.findings.catalogue import ENTRIES
 
-ROOT = Path(__file__).parents[1]
-PACKAGE = ROOT / "python/trihedron"
 RETIRED = {
     # Only where zero means a bias: as a number it stays.
     r"\bzero[- ]readings?": "bias",
@@ -83,12 +81,11 @@ def modules() -> Said:
     """Texts of two words and more and headings, docstrings apart: all that reports, errors and exported files say."""
     yield from ((path.name, re.sub(r"<[^>]*>", " ", path.read_text("utf-8"))) for path in PACKAGE.rglob("*.j2"))
     for path in PACKAGE.rglob("*.py"):
-        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-        inside = {id(part) for node in nodes if isinstance(node, ast.JoinedStr) for part in node.values}
-        for node in nodes:
+        inside = {id(part) for node in nodes(path) if isinstance(node, ast.JoinedStr) for part in node.values}
+        for node in nodes(path):
             body = getattr(node, "body", None)
             inside |= {id(one.value) for one in (body if isinstance(body, list) else ()) if isinstance(one, ast.Expr)}
-        for node in nodes:
+        for node in nodes(path):
             if isinstance(node, ast.JoinedStr):
                 text = "".join(str(part.value) if isinstance(part, ast.Constant) else "{" for part in node.values)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in inside:
