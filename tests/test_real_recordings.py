@@ -238,7 +238,7 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
         assert abs((S @ seen)[turn[2]] - turn[3]) < math.radians(0.5)
 
 
-N, RATE = 360_000, 100.0
+N, RATE = 120_000, 100.0
 WHITE = 1e-4
 """N of readings that scatter by 1e-3 at 100 Hz."""
 
@@ -335,7 +335,7 @@ def test_readings_far_out_that_belong_to_the_noise_are_not_cut_from_it():
     x = 1e-3 * np.random.default_rng(0).standard_t(3, size=(N, 3)) / np.sqrt(3.0)
     result, found = axes_of(x)
     # A few of the largest are.
-    assert len(result.excluded_s) < 30
+    assert len(result.excluded_s) < 10
     for white in found:
         assert abs(white.estimate - WHITE) < 3.0 * white.sigma
         assert white.sigma < 0.02 * WHITE
@@ -343,11 +343,10 @@ def test_readings_far_out_that_belong_to_the_noise_are_not_cut_from_it():
 
 @pytest.mark.parametrize("size", [5e-4, 0.1])
 def test_a_bias_that_warms_up_is_no_random_walk(size):
-    t = np.arange(N) / RATE
-    x = 1e-3 * np.random.default_rng(1).normal(size=(N, 3)) + size * (1.0 - np.exp(-t / 600.0))[:, None]
+    t = np.arange(3 * N) / RATE
+    x = 1e-3 * np.random.default_rng(1).normal(size=(3 * N, 3)) + size * (1.0 - np.exp(-t / 600.0))[:, None]
     # What a bias of 100 times the noise does in its first minutes is neither an impact nor a step.
-    chunked = stream_noise(np.array_split(x, 5), RATE)
-    for axis in (*axes_of(x)[0].axes, *chunked.axes):
+    for axis in stream_noise(np.array_split(x, 5), RATE).axes:
         said = [one for one in axis.findings if one.code == "log-drift"]
         assert [round(float(one.numbers["time_s"]) / 600.0, 1) for one in said] == pytest.approx([1.0], abs=0.2)
         assert {"log-jump", "log-impact"}.isdisjoint(one.code for one in axis.findings)
