@@ -223,14 +223,6 @@ def test_what_a_board_says_at_start_is_no_frame(tmp_path):
     assert recorder.count.corrupt <= 1
 
 
-def test_a_board_whose_clock_runs_fast_writes_its_own_time(tmp_path):
-    raw = sent(tmp_path / "raw.txt", counts_recording(1001, 100.0), "xio", Faults(drift_ppm=500.0))
-    _, blocks = capture(raw, tmp_path / "log.csv")
-    times = np.concatenate([block.time_s for block in blocks])
-    # Ten seconds and 5 ms, in whole microseconds.
-    assert times[-1] - times[0] == pytest.approx(10.005, abs=2e-6)
-
-
 def test_frames_without_a_clock_are_paced_by_all_of_their_arrivals_when_their_log_is_read():
     # Pieces of 8 frames, late by up to 20 ms; four seconds away after the third of ten; a counter that went on there.
     rng, rate_hz = np.random.default_rng(0), 416.0

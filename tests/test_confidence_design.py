@@ -10,7 +10,6 @@ import trihedron
 from confidence.design import drawn, session
 from confidence.motion import G
 from confidence.sensor import lower, recorded
-from confidence.sessions import table
 from trihedron import calibrate
 from trihedron.api.planning import POSE_SETS
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
@@ -107,18 +106,6 @@ def test_quick_moves_of_a_sensor_that_averages_are_told_from_those_of_one_that_s
         # Nine parameters a session: the rms of six is uncertain by 15 %. Taken for points it was 1.7 of averages.
         assert np.sqrt(np.mean(np.square(scores))) < 1.45
         assert np.abs(scores).max() < 4.0
-
-
-def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
-    f, w, rate, _, motion = table(6, turns=(180.0, -180.0))
-    log = recorded(f, w, rate)
-    n_poses = len(motion.rests)
-    up = [face for face in (1, -1, 2, -2, 3, -3) for _ in range(n_poses // 6)]
-    result = calibrate(log, gravity_m_s2=G, method="faces", faces=[*up[:-1], 0])
-    left_out = next(one for one in result.findings if one.code == "pose-not-a-face")
-    assert f"poses {n_poses}" in left_out.seen
-    with pytest.raises(ValueError, match=f"faces must be {n_poses} numbers"):
-        calibrate(log, gravity_m_s2=G, method="faces", faces=up[:-1])
 
 
 def test_a_delay_between_the_sensors_that_hides_in_the_noise_of_velocities_moves_no_scale():

@@ -12,7 +12,6 @@ from confidence.sessions import hand
 from diagnosed_session import unit_of
 from trihedron import calibrate, extend
 from trihedron.estimate.gyroscope.lost_samples import could_be_remade, missing_samples
-from trihedron.estimate.session import solved
 from trihedron.records import Recording, Severity
 from trihedron.segment import segment_recording
 from trihedron.session.joints import joints
@@ -76,14 +75,6 @@ def test_few_losses_leave_outliers_and_many_a_scale_that_is_not_to_be_trusted(sh
         z = (result.gyroscope.S - lower(truth).S_w) / result.gyroscope.sigma_S
         # The turns are short by 3 %, by hundreds of the standard errors that noise alone would give.
         assert np.abs(z).max() < 4.0
-
-
-def test_a_healthy_session_is_widened_by_no_losses(monkeypatch):
-    f, w, rate, _, _ = hand(5400001)
-    plain = calibrate(recorded(f, w, rate), gravity_m_s2=G)
-    monkeypatch.setattr(solved, "could_be_remade", lambda *_: False)
-    asked = calibrate(recorded(f, w, rate), gravity_m_s2=G)
-    np.testing.assert_array_equal(plain.gyroscope.covariance, asked.gyroscope.covariance)
 
 
 def session(share, seed, move_s=2.0, grade="mpu"):

@@ -203,14 +203,6 @@ def test_a_hovering_flight_is_not_taken_for_poses_in_silence(scatter, is_said):
     assert ("poses-vibrate" in codes(segments)) == is_said
 
 
-@pytest.mark.parametrize(("grade", "is_said"), [(1.0, False), (60.0, True)])
-def test_a_sensor_held_in_the_hand_is_said_not_to_be_still(grade, is_said):
-    """Sixty times the data sheet's noise turns the gyro as a hand does, and no sensor."""
-    segments = segment_recording(simulate(scenario(hand_session(12), grade), seed=1)[0])
-    assert segments.n_poses >= 9
-    assert ("poses-vibrate" in codes(segments)) == is_said
-
-
 @pytest.mark.parametrize("n", [1, 2, 60])
 def test_a_log_too_short_for_a_hold_is_a_finding_not_an_exception(n):
     rng = np.random.default_rng(n)

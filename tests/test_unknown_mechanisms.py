@@ -67,14 +67,6 @@ def test_a_gyro_scale_that_follows_an_unlogged_voltage_has_no_other_name():
     assert found.relations[0].depends_on[0] == "w times cosine 1 of time"
 
 
-def test_a_smooth_drift_of_twelve_errors_of_a_pose_is_a_drift():
-    recording, _, poses, turning = session()
-    error = np.median([turning[p.start : p.stop].std(axis=0) / np.sqrt(p.stop - p.start) for p in poses], axis=0)
-    parabola = (2.0 * recording.time_s / recording.time_s[-1] - 1.0) ** 2
-    found = found_with(rate=12.0 * np.outer(parabola, error))
-    assert [one.id for one in found.effects] == ["gyro-bias-drift"]
-
-
 def test_a_bias_that_steps_once_is_a_drift_by_that_step_and_at_its_time():
     recording, *_ = session()
     at, step = 0.6 * recording.time_s[-1], np.array([0.1, -0.2, 0.05])
