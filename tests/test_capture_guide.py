@@ -126,6 +126,15 @@ def test_the_accuracy_is_never_said_to_be_reached_before_the_poses_tell_it():
     assert np.sum(np.abs(state.next_up) > 0.3) >= 2
 
 
+def test_of_signed_counts_with_a_large_zero_six_faces_are_told_by_the_middle_of_their_readings():
+    recording, truth = trihedron.simulate("six-faces", 0)
+    assert recording.accelerometer_unit.value == "counts"
+    # A third of |g|; faces of a hand are within some degrees of an axis.
+    off = replace(recording, accelerometer=recording.accelerometer + 5000.0)
+    up = np.abs(examine(off, ACCURACY, gravity_m_s2=truth.gravity_m_s2).poses_up)
+    assert up.max(axis=1).min() > 0.99
+
+
 @pytest.mark.parametrize("rate_hz", [50.0, 400.0])
 def test_stillness_is_seen_within_half_a_second_at_any_rate(rate_hz):
     rng = np.random.default_rng(1)
