@@ -242,6 +242,13 @@ def test_a_cycle_of_temperature_tells_microseconds_from_nanoseconds(tmp_path):
     assert recording.rate_hz == pytest.approx(2.0, rel=1e-6)
 
 
+def test_ticks_with_decimals_are_microseconds_rather_than_nanoseconds(tmp_path):
+    table = log(16.0, 1e-6)
+    # 16 kHz in nanoseconds, of which no program writes a fraction.
+    table[:, 0] += 0.25
+    assert read_recording(write(tmp_path / "log.csv", table)).rate_hz == pytest.approx(16.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("word", ["0 us", "0 Hz", "0.0 ms", "-1 ms", "furlong", "inf s"])
 def test_a_tick_without_a_length_is_no_time_unit(word):
     with pytest.raises(ReadError, match="is not a time unit"):
