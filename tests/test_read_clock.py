@@ -242,9 +242,11 @@ def test_a_cycle_of_temperature_tells_microseconds_from_nanoseconds(tmp_path):
     assert recording.rate_hz == pytest.approx(2.0, rel=1e-6)
 
 
-def test_ticks_with_decimals_are_microseconds_rather_than_nanoseconds(tmp_path):
+def test_ticks_of_a_slow_log_are_microseconds_rather_than_nanoseconds_with_decimals_or_without(tmp_path):
+    # 16 Hz; in nanoseconds, which are no bare counts and have no decimals, 16 kHz.
     table = log(16.0, 1e-6)
-    # 16 kHz in nanoseconds, of which no program writes a fraction.
+    recording = read_recording(write(tmp_path / "log.csv", table))
+    assert finding(recording, "time-unit-detected").severity is Severity.NOTE
     table[:, 0] += 0.25
     assert read_recording(write(tmp_path / "log.csv", table)).rate_hz == pytest.approx(16.0, rel=1e-6)
 

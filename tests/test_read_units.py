@@ -323,11 +323,11 @@ FLIP_Y = np.diag([1.0, -1.0, 1.0])
 EXCHANGE = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
-def changes(change, sensor, at=0.5, seed=1):
+def changes(change, sensor, at=0.5, seed=1, bias=0.0):
     """Findings on a log whose readings of one sensor are multiplied by ``change`` (3, 3) from a part of it on."""
     t, force, rate = motion(50.0, seed, n_poses=14)
     k = round(at * len(t))
-    readings = {"acc": force, "gyr": rate}
+    readings = {"acc": force, "gyr": rate + np.array(bias)}
     readings[sensor][k:] = readings[sensor][k:] @ np.asarray(change).T
     found = trihedron.read({"time_s": t, **readings}).findings
     return t[k], [f for f in found if f.severity is Severity.SERIOUS]
@@ -359,3 +359,9 @@ def test_axes_that_do_not_change_are_not_reported(seed):
     assert not changes(np.eye(3), "gyr", seed=seed)[1]
     # Axes of other directions than the names say are alike throughout.
     assert not changes(EXCHANGE, "gyr", 0.0, seed)[1]
+
+
+def test_axes_that_change_beside_a_bias_that_turns_as_far_as_a_move_are_found():
+    # 10 °/s, some 15° in a move.
+    _, (one,) = changes(FLIP_Y, "gyr", bias=(0.15, -0.1, 0.12))
+    assert one.code == "axes-changed"
