@@ -259,6 +259,18 @@ def test_poses_inside_a_range_below_gravity_are_found_and_those_beyond_are_left_
     np.testing.assert_allclose(np.diag(found.S), 1.0, atol=5 * np.diag(found.sigma_S).max())
 
 
+def test_a_channel_that_is_stuck_at_a_limit_is_told_from_a_range_below_gravity():
+    said = []
+    for limit, stuck in ((9.7, 0), (15.0, 1500)):
+        _, recording = posed(24, noise=0.01, step=0.0012, limit=limit)
+        read = recording.accelerometer.copy()
+        # Three poses that read 1.5 g along X beside the gravity of the others.
+        read[:stuck, 0] = limit
+        findings = segment(replace(recording, accelerometer=read)).findings
+        said += ["stuck" in one.cause for one in findings if one.code == "pose-at-range-limit"]
+    assert said == [False, True]
+
+
 @pytest.mark.parametrize(
     ("noise", "step", "pose_s"), [(0.0, 0.16, 4.0), (0.02, 0.16, 1.5), (0.1, 0.16, 4.0), (0.0, 1e-9, 1.5)]
 )

@@ -137,6 +137,14 @@ def test_one_pose_that_turns_is_no_noise_of_the_others(session):
     assert (np.delete(ratio, 6, axis=0) < 1.3).all()
 
 
+def test_a_bias_of_one_pose_that_gravity_contradicts_costs_no_pose(session):
+    recording, truth = session
+    gyroscope, held = recording.gyroscope.copy(), truth.poses[6]
+    # 0.5 °/s about every axis: two degrees in the pose, in which gravity stays where it is.
+    gyroscope[held.start : held.stop] += 0.5 * 131.0
+    assert segment_recording(replace(recording, gyroscope=gyroscope)).n_poses == len(truth.poses)
+
+
 def test_a_pose_held_in_the_hand_is_told_from_a_table():
     recording, truth = simulate(scenario(hand_session(12)), 5)
     rng = np.random.default_rng(5)
