@@ -18,6 +18,7 @@ from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_state
+from trihedron.records import Finding, Severity
 from trihedron.records.domains import DomainTest
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.model import DYNAMICS, MOVES, contiguous, core_state
@@ -94,6 +95,18 @@ def test_every_candidate_says_why_it_was_not_taken():
         assert row["size"], row["id"]
         if row["id"] not in {effect["id"] for effect in said["effects"]}:
             assert row["limit95"] > 0.0, row["id"]
+
+
+def test_the_time_in_which_poses_were_seen_to_settle_is_tried_beside_the_usual_ones():
+    context, effect = fitted().context, by_id()["accel-hysteresis"]
+    lasting = (("bias-settling", {"tau_s": 5.5}), ("pose-settling", {"poses": 1.0}))
+    findings = tuple(Finding(code, Severity.NOTE, "", numbers=numbers) for code, numbers in lasting)
+    told = replace(context.obs, segments=replace(context.obs.segments, findings=findings))
+    usual, tried = (
+        {one.shape["time_constant"] for one in effect.variants(given) if one.label == "creep"}
+        for given in (context, replace(context, fitted=replace(context.fitted, obs=told)))
+    )
+    assert tried - usual == {(5.5, "s")}
 
 
 @pytest.mark.parametrize(
