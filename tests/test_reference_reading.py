@@ -131,3 +131,13 @@ def test_a_truth_that_wanders_in_the_body_leaves_the_accelerometer_within_its_un
 def test_poses_that_a_robot_repeats_are_no_jump_of_the_clock():
     trial = truth(2, "robot", seconds=40, size_deg=0.03, lasting_s=6.0)
     assert laid_beside(trial.log, trial.motion, G).grid is not None
+
+
+def test_the_bias_over_time_follows_the_bias_that_walked():
+    trial = truth(2, "robot", seconds=40, size_deg=0.03, lasting_s=6.0)
+    bias = fit_reference(trial.log, trial.motion, G).bias
+    at = 0.01 * np.arange(len(trial.walked))
+    for k in range(3):
+        walked = np.interp(bias.time_s, at, trial.walked[:, k])
+        # b takes it off; a walk of one standard error is shrunk, and never turned round.
+        assert np.corrcoef(bias.value[:, k], -walked)[0, 1] > 0.5
