@@ -303,3 +303,11 @@ def test_a_calibration_that_leaves_its_own_poses_no_smaller_error_is_said_to_be_
     for calibration, codes in ((good, []), (bad, ["worse-than-uncalibrated"])):
         said = reference_findings(calibration, result.recording, result.segments)
         assert [one.code for one in said] == codes
+
+
+def test_the_same_file_given_twice_does_not_count_twice(four_sessions):
+    first, other = (replace(one, sha256=name) for one, name in zip(four_sessions[:2], "ab", strict=True))
+    copy = replace(first, source="copy.csv")
+    for together in (trihedron.calibrate_sessions, trihedron.diagnose_sessions):
+        with pytest.raises(trihedron.InputError, match=r"copy\.csv: the same recording as"):
+            together([first, copy, other], gravity_m_s2=G)

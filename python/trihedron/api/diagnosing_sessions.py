@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.api.sessions import of_several_units
+from trihedron.api.sessions import of_several_units, refuse_again
 from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose import diagnose_recordings
 from trihedron.errors import INPUT_ERRORS, InputError
@@ -49,7 +49,7 @@ def diagnose_sessions(
     Raises
     ------
     ValueError
-        When there are fewer than two recordings, or one of them cannot be calibrated.
+        When there are fewer than two recordings, one is given twice, or one cannot be calibrated.
 
     Examples
     --------
@@ -60,6 +60,7 @@ def diagnose_sessions(
     results = []
     for one in recordings:
         recording = recording_of(one, latitude_deg)
+        refuse_again(recording, (other for other, _, _ in given))
         try:
             result = calibrate(recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m)
         except INPUT_ERRORS as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
@@ -70,7 +70,7 @@ def calibrate_sessions(
     Raises
     ------
     ValueError
-        When fewer than two recordings can be calibrated, or their group is unknown.
+        When fewer than two recordings can be calibrated, a file is given twice, or their group is unknown.
 
     Examples
     --------
@@ -89,6 +89,7 @@ def calibrate_sessions(
     left_out: list[tuple[str, str]] = []
     for k, given in enumerate(recordings):
         recording = recording_of(given)
+        refuse_again(recording, (result.recording for result in results))
         label = _label(recording, by) if labels is None else labels[k]
         notify(k / len(recordings), f"calibrating {Path(recording.source).name}")
         try:
@@ -149,6 +150,18 @@ def _doubts(results: Sequence[CalibrationResult], sessions: Sequence[Session]) -
             seen=seen,
             path=path,
         )
+
+
+def refuse_again(recording: Recording, others: Iterable[Recording]) -> None:
+    """Raise where the readings of a file were given before: their evidence would count twice.
+
+    Devices of one archive share its ``sha256`` and differ in readings.
+    """
+    for other in others:
+        if recording.sha256 and recording.sha256 == other.sha256:
+            pairs = ((getattr(one, name) for one in (recording, other)) for name in ("accelerometer", "gyroscope"))
+            if all(a is b is None or np.array_equal(a, b, equal_nan=True) for a, b in pairs):
+                raise InputError(f"{recording.source}: the same recording as {other.source}; give each once.")
 
 
 def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:
