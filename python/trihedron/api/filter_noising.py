@@ -7,8 +7,6 @@ import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 
-import numpy as np
-
 from trihedron.api.choices import settle_gravity
 from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_log
 from trihedron.api.identifying import allan
@@ -245,6 +243,5 @@ def _between_intervals(
     scale = rate_to_si(recording.gyroscope_unit)
     if recording.gyroscope is None or scale is None or "gyroscope" not in known:
         return None, None
-    rate = np.nan_to_num(recording.gyroscope * scale)
-    stated = (recording.with_distinct_timestamps().time_s, rate, segments, known["gyroscope"])
+    stated = (recording, segments, scale, known["gyroscope"])
     return tilt_over_moves(*stated), between_intervals(*stated)

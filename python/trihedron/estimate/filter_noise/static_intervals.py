@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import TINY, FloatArray, rms_of
-from trihedron.estimate.attitude import integrate_rate
+from trihedron.arrays import TINY, rms_of
+from trihedron.estimate.gyroscope.measurements import measure_moves
+from trihedron.estimate.session.carried import carried
 from trihedron.probability import NORMAL_95
-from trihedron.records import NoiseAxis, Segments, TermName
+from trihedron.records import NoiseAxis, Recording, Segments, SensorCalibration, TermName
 from trihedron.records.filter_noise import Bounded, IntervalCheck, StaticNoise, TiltCheck
 from trihedron.records.noise import of_axes
 
@@ -41,59 +43,45 @@ def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
     return Bounded(value, value / factor, value * factor)
 
 
-def tilt_over_moves(time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise) -> TiltCheck | None:
-    """Tilt errors after rotations, from gyro rates (n, 3) [rad/s], with their prediction from static noise.
-
-    The bias is the mean rate of the poses on both sides; rotation about the vertical is not observable. None without a
-    move."""
-    means = segments.accelerometer_mean
-    if means is None:
+def tilt_over_moves(recording: Recording, segments: Segments, rad_s: float, static: StaticNoise) -> TiltCheck | None:
+    """Tilt errors after rotations (docs/model-session.md) of readings scaled by their unit, ``rad_s`` of the gyro's,
+    with their prediction from static noise; rotation about the vertical is not observable. None without a move."""
+    means, none = segments.accelerometer_mean, np.zeros(3)
+    if means is None or not any(move.stop - move.start >= 2 for move in segments.moves):
         return None
-    sigma = np.zeros_like(means) if segments.accelerometer_sigma_mean is None else segments.accelerometer_sigma_mean
-    # Two directions across gravity.
-    variance_up = 2.0 * np.mean(sigma**2, axis=1) / np.sum(means**2, axis=1)
-    errors, predicted, longest = [], [], 0.0
-    for move in segments.moves:
-        before, after = segments.poses[move.pose_before], segments.poses[move.pose_after]
-        length = float(time_s[move.stop] - time_s[move.start])
-        if not 0.0 < length <= LONGEST_MOVE_S:
-            continue
-        static_samples = np.concatenate([before.samples(), after.samples()])
-        turned = integrate_rate(
-            time_s[move.start : move.stop + 1],
-            rate[move.start : move.stop + 1] - rate[static_samples].mean(axis=0),
-            last_only=True,
-        )
-        up = [means[k] / np.linalg.norm(means[k]) for k in (move.pose_before, move.pose_after)]
-        errors.append(float(np.arccos(np.clip(up[1] @ (turned.T @ up[0]), -1.0, 1.0))))
-        static_s = len(static_samples) * float(np.median(np.diff(time_s)))
-        of_gyro = 2.0 * static.N.filter_value**2 * (length + length**2 / static_s)
-        predicted.append(of_gyro + variance_up[move.pose_before] + variance_up[move.pose_after])
-        longest = max(longest, length)
-    if not errors:
+    gravity = float(np.linalg.norm(means, axis=1).mean())
+    in_raw = SensorCalibration(np.eye(3), none, np.zeros((12, 12)), "", "", "")
+    measured = measure_moves(recording, segments, in_raw)
+    measured = replace(measured, noise_density=np.full(3, static.N.filter_value / rad_s))
+    anchors_s = segments.time_mid_s[measured.links]
+    seen = carried(measured, anchors_s, in_raw.S, none, rad_s * np.eye(3))
+    used = ~measured.is_lost & (measured.durations_s <= LONGEST_MOVE_S)
+    if not used.any():
         return None
-    return TiltCheck(len(errors), longest, rms_of(np.array(errors)), math.sqrt(float(np.mean(predicted))))
+    predicted = math.sqrt(float(np.mean(seen.floor2[used]))) / gravity
+    actual = rms_of(np.radians(seen.angle_deg[used]))
+    return TiltCheck(int(np.count_nonzero(used)), float(measured.durations_s[used].max()), actual, predicted)
 
 
 def between_intervals(
-    time_s: FloatArray, rate: FloatArray, segments: Segments, static: StaticNoise
+    recording: Recording, segments: Segments, rad_s: float, static: StaticNoise
 ) -> IntervalCheck | None:
-    """Changes of the mean of ``rate`` (n, 3) [rad/s] and of |g| between static intervals; None with fewer than two.
+    """Changes of bias and of |gravity| between neighbouring static intervals, predicted from static N and K; ``rad_s``
+    is the unit of the gyro. None for fewer than two intervals.
 
     Where K is an upper limit, the limit predicts: a larger change exceeds any random walk that the noise allows.
     """
-    means, poses = segments.accelerometer_mean, segments.poses
-    if means is None or len(poses) < 2:
+    means, rates, poses = segments.accelerometer_mean, segments.gyroscope_mean, segments.poses
+    if means is None or rates is None or len(poses) < 2:
         return None
-    bias = np.array([rate[pose.samples()].mean(axis=0) for pose in poses])
-    ends = np.array([(time_s[pose.start], time_s[pose.stop - 1]) for pose in poses])
+    ends = np.array([recording.time_s[[pose.start, pose.stop - 1]] for pose in poses])
     lasted, apart = np.maximum(ends[:, 1] - ends[:, 0], 1e-9), np.diff(ends.mean(axis=1))
     predicted = static.N.filter_value**2 * (1.0 / lasted[1:] + 1.0 / lasted[:-1]) + static.K.filter_value**2 * apart
     gravity = np.linalg.norm(means, axis=1)
     return IntervalCheck(
         n=len(poses),
         longest_s=float(apart.max()),
-        bias_change=rms_of(np.diff(bias, axis=0)),
+        bias_change=rad_s * rms_of(np.diff(rates, axis=0)),
         predicted=float(np.sqrt(np.mean(predicted))),
         gravity_spread=float(gravity.std() / gravity.mean()),
     )
