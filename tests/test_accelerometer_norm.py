@@ -117,18 +117,6 @@ def test_the_first_advised_pose_beats_every_other_candidate(kept):
     assert by_words[advised] <= min(by_words.values()) * 1.02
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"axis_signs": (1, 2, 3)}, "axis signs"),
-        ({"raw_unit": "furlong"}, "furlong"),
-    ],
-)
-def test_malformed_questions_are_answered_in_words(arguments, words):
-    with pytest.raises(ValueError, match=words):
-        calibrate_norm(readings(cube_poses(), 1), SIGMA, G, **arguments)
-
-
 def test_the_noise_of_a_length_is_that_of_its_readings_and_of_its_parameters():
     rng = np.random.default_rng(6)
     S, b = np.array([[1.3, 0.0, 0.0], [0.2, 0.8, 0.0], [-0.1, 0.3, 1.1]]), np.array([0.3, -0.2, 0.5])

@@ -44,6 +44,7 @@ class Weakness(NamedTuple):
 
 
 AXIS_BY_AXIS = {"path": "axis by axis", "grade": "industrial"}
+LONG = {"pause that turns below the noise"}
 QUICK = {"bits": 10, "move_s": 0.6, "tremor_deg_s": 0.0}
 WEAKNESSES = {
     # Its scale was narrowed and its bias was not: the covariance had an eigenvalue of -3.6.
@@ -77,7 +78,9 @@ WEAKNESSES = {
 }
 
 
-@pytest.mark.parametrize("weakness", WEAKNESSES.values(), ids=WEAKNESSES)
+@pytest.mark.parametrize(
+    "weakness", [pytest.param(one, id=k, marks=[pytest.mark.slow] * (k in LONG)) for k, one in WEAKNESSES.items()]
+)
 def test_errors_of_a_session_that_was_weak_are_within_their_uncertainty(weakness):
     result, z = calibrated(weakness.seed, **weakness.levels)
     for name, limit in weakness.limits.items():

@@ -1,6 +1,7 @@
 """A given model held against a recording: numbers are distinguished from physics, in any frame."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -142,6 +143,11 @@ def test_one_number_that_moves_leaks_into_no_other_group(group):
     assert said == {group}
 
 
+@cache
+def healthy():
+    return diagnosed("", 3, 12)
+
+
 def unit(seed):
     return unit_of(hand_session(12, pose_s=2.5, layout=seed), 77, is_wide=True)
 
@@ -171,7 +177,7 @@ def test_an_effect_that_only_the_simulation_has_is_surplus():
 
 
 def test_residuals_under_effects_that_both_have_keep_the_names_of_their_rows():
-    found = diagnosed("", 3, 12)
+    found = healthy()
     fewer = replace(found.residuals[0], names_before=("pose 1",))
     (row,) = _with_shared_effects(replace(found, residuals=(fewer,))).residuals
     assert row.names_before == row.names_after
@@ -179,7 +185,7 @@ def test_residuals_under_effects_that_both_have_keep_the_names_of_their_rows():
 
 
 def test_misfit_that_stays_unexplained_widens_the_uncertainty_of_its_own_sensor():
-    found = diagnosed("", 3, 12)
+    found = healthy()
     moves = next(test for test in found.remaining if test.domain == "moves")
     left = [replace(test, chi2_per_dof=9.0, disagrees=True) if test is moves else test for test in found.remaining]
     widened = replace(found, remaining=tuple(left))
@@ -191,7 +197,7 @@ def test_misfit_that_stays_unexplained_widens_the_uncertainty_of_its_own_sensor(
 
 
 def test_a_reversed_gyro_axis_is_an_effect_and_no_other_bias_angle_or_alignment():
-    found = diagnosed("", 3, 12)
+    found = healthy()
     sense = np.array([1.0, -1.0, 1.0])
     turned = np.concatenate([np.ones(12), np.tile(sense, 3), np.ones(3)])
     fit, signs = found.extended, zip("xyz", sense, strict=True)
@@ -250,6 +256,7 @@ def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, c
         assert lacks in said
 
 
+@pytest.mark.usefixtures("few_simulations")
 def test_gravity_is_that_of_the_scenario_unless_given():
     """A simulation at the pole, and a log of it: with standard gravity on one side scales would differ by 0.3 %."""
     at_the_pole = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=9, pose_s=2.0, move_s=1.0))

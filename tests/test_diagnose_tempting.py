@@ -90,7 +90,8 @@ def low_pass(values, dt_s, tau_s):
 
 
 @pytest.mark.parametrize(
-    ("lag_s", "seed"), [(20.0, 1), (-20.0, 2), pytest.param(8.0, 3, marks=pytest.mark.slow), (35.0, 4)]
+    ("lag_s", "seed"),
+    [(20.0, 1), (-20.0, 2), *(pytest.param(*o, marks=pytest.mark.slow) for o in ((8.0, 3), (35.0, 4)))],
 )
 def test_a_bias_follows_the_temperature_of_the_die_and_a_thermometer_beside_it_lags(lag_s, seed):
     recording, truth = simulate(session("mpu", seed), seed)

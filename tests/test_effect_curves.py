@@ -171,7 +171,7 @@ def added(log, truth, of_rate):
 
 
 # A field whose horizontal part is a third of its vertical one is no g-sensitivity.
-@pytest.mark.parametrize("field", [(0.8, 0.3, -0.5), (1.2, 0.6, -3.76)], ids=["inclined", "steep"])
+@pytest.mark.parametrize("field", [(0.8, 0.3, -0.5), pytest.param((1.2, 0.6, -3.76), marks=pytest.mark.slow)])
 def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter(field):
     log, truth, _, _ = session(4, 22)
     vector = Rotation.from_quat(np.roll(truth.attitude, -1, axis=1)).inv().apply(field)

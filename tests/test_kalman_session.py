@@ -17,7 +17,7 @@ from trihedron.estimate.kalman.norm_invariant import calibrate_without_reference
 from trihedron.estimate.kalman.per_axis import shaping_model
 from trihedron.estimate.kalman.session import calibrate_session, noise_from_poses, pose_readings
 from trihedron.read import ReadError, read_axis_noise, read_pose_table
-from trihedron.records import AxisNoise, PoseTable, Recording
+from trihedron.records import AxisNoise, PoseTable
 from trihedron.segment import segment_recording
 from trihedron.simulate import Clock, NoiseTerms, Scenario, dividing_head, long_static, scenario_by_name, simulate
 from trihedron.simulate.accelerometer import Accelerometer
@@ -246,13 +246,3 @@ def test_nine_poses_for_nine_parameters_test_nothing():
     assert {one.code for one in found.findings} == {"few-poses"}
     _, alone = calibrate_norm(readings, np.full((9, 3), 0.01), GRAVITY, raw_unit="counts")
     assert "few-poses" in {one.code for one in alone}
-
-
-def test_as_many_poses_as_parameters_give_a_page_that_says_that_nothing_tests_them(tmp_path):
-    log, truth = simulate(scenario_by_name("hand-session"), 5)
-    end = truth.poses[9].start
-    few = Recording.from_arrays(log.time_s[:end], log.accelerometer[:end], accelerometer_unit="counts")
-    page = tmp_path / "few.html"
-    said = trihedron.report(trihedron.kalman(few, gravity_m_s2=GRAVITY), page)
-    assert "without redundancy" in said
-    assert "no redundancy" in page.read_text("utf-8")

@@ -46,7 +46,7 @@ def lossy(seed, time_of=None):
     return result, (result.gyroscope.S - lower(truth).S_w) / result.gyroscope.sigma_S
 
 
-@pytest.mark.parametrize("seed", [30000, 20018, 5500026])
+@pytest.mark.parametrize("seed", [20018, *(pytest.param(k, marks=pytest.mark.slow) for k in (30000, 5500026))])
 def test_losses_are_possible_wherever_moves_are_missed(seed):
     """All moves missed more than noise does, or those that missed most were excluded."""
     result, z = lossy(seed)

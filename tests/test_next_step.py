@@ -147,14 +147,6 @@ def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():
         assert ("--extended" in said) == is_first
 
 
-def test_a_calibration_less_certain_than_that_of_the_log_is_replaced_though_its_uncertainty_allows_its_errors():
-    agrees = SimpleNamespace(significant=False, id="accel-scale")
-    imprecise = Finding.of("calibration-imprecise", "static", times=26.0, p=1e-9)
-    for findings, is_kept in (((), True), ((imprecise,), False)):
-        found = SimpleNamespace(verdict="consistent", parameters=(agrees,), findings=findings)
-        assert next_step_in_words(found, "cal.json").startswith("Keep using cal.json") == is_kept
-
-
 @pytest.mark.parametrize(
     ("own_level", "first"), [("usable", "Check the sensor."), (None, "Use a firm support. Then: ")]
 )

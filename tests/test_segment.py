@@ -8,7 +8,6 @@ from scipy import stats
 
 import hand_stops
 from trihedron.records import Recording
-from trihedron.report.segments import segments_report
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import NoiseTerms, Scenario, hand_session, scenario_by_name, simulate, table_turns
 from trihedron.simulate.accelerometer import Accelerometer
@@ -243,19 +242,6 @@ def test_poses_are_found_as_the_diagnosis_takes_them_and_no_other_stop_is_one(ki
     assert n_pauses >= (40 if kind == "pauses" else 0)
     assert n_lost <= share * n_poses
     assert n_false <= most
-
-
-@pytest.mark.parametrize(("static_s", "command"), [(120.0, "trihedron allan"), (5.0, "trihedron check")])
-def test_long_static_stretches_in_few_poses_are_a_log_for_noise(static_s, command):
-    rng, n = np.random.default_rng(2), int(static_s * 100.0)
-    down = [np.tile(up, (n, 1)) for up in ([0.0, 0.0, 9.8], [9.8, 0.0, 0.0])]
-    between = np.linspace(down[0][-1], down[1][0], 100)
-    force = np.concatenate([down[0], between, down[1]])
-    force = force + 0.01 * rng.normal(size=force.shape)
-    rate = 1e-3 * rng.normal(size=force.shape)
-    rate[n : n + 100, 1] += 0.5 * np.pi
-    recording = Recording(np.arange(len(force)) / 100.0, force, rate, 100.0)
-    assert command in segments_report(segment_recording(recording), recording).next_step
 
 
 @pytest.mark.parametrize("seed", [8, 14, 16])

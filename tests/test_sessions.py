@@ -31,6 +31,12 @@ def four_sessions():
     return [recorded(unit, seed) for seed, unit in enumerate(units, 1)]
 
 
+@pytest.fixture(scope="module")
+def first(four_sessions):
+    """The calibration of the first of them."""
+    return trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
+
+
 def test_numbers_free_of_the_frame_give_back_the_model_that_they_were_taken_from():
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -248,12 +254,10 @@ def test_a_recording_in_another_unit_is_named_and_the_common_parameters_are_not_
     assert not result.is_trustworthy
 
 
-def test_a_calibration_applied_to_readings_two_percent_off_is_warned_of_and_to_its_own_it_is_not(four_sessions):
-    known = trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
-
+def test_a_calibration_applied_to_readings_two_percent_off_is_warned_of_and_to_its_own_it_is_not(four_sessions, first):
     def severity(scale):
         log = replace(four_sessions[1], accelerometer=scale * four_sessions[1].accelerometer)
-        found = [f for f in trihedron.apply(known, log).findings if f.code == "static-force"]
+        found = [f for f in trihedron.apply(first, log).findings if f.code == "static-force"]
         return [one.severity for one in found]
 
     assert severity(1.0) == [Severity.NOTE]
@@ -262,10 +266,9 @@ def test_a_calibration_applied_to_readings_two_percent_off_is_warned_of_and_to_i
 
 
 @pytest.mark.parametrize(("factor", "is_common"), [([1.01] * 3, True), ([1.01, 1.0, 1.0], False), ([1.0] * 3, False)])
-def test_one_factor_on_all_axes_of_a_gyro_is_told_from_a_change_of_one_axis(four_sessions, factor, is_common):
-    known = trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
+def test_one_factor_on_all_axes_of_a_gyro_is_told_from_a_change_of_one_axis(four_sessions, first, factor, is_common):
     log = replace(four_sessions[1], gyroscope=four_sessions[1].gyroscope * np.array(factor))
-    verified = trihedron.verify(known, log)
+    verified = trihedron.verify(first, log)
     common = common_factor(verified.verification.parameters, "gyro-scale")
     assert (common is not None) is is_common
 
@@ -283,8 +286,8 @@ def test_a_scale_of_one_axis_two_percent_off_is_of_another_unit_in_every_command
         assert [one.code for one in found] == ["several-devices"] * is_several
 
 
-def test_errors_within_a_wide_uncertainty_and_above_those_of_the_own_calibration_are_no_verification(four_sessions):
-    known = trihedron.calibrate(four_sessions[0], gravity_m_s2=G).calibration
+def test_errors_within_a_wide_uncertainty_and_above_the_own_calibrations_are_no_verification(four_sessions, first):
+    known = first.calibration
     covariance = known.covariance + np.diag(np.repeat([0.0, 0.05**2, 0.0], [9, 3, 12]))
     accel = replace(known.accelerometer, b=known.accelerometer.b + 0.05, covariance=covariance[:12, :12])
     wide = replace(known, accelerometer=accel, covariance=covariance)
@@ -296,12 +299,11 @@ def test_errors_within_a_wide_uncertainty_and_above_those_of_the_own_calibration
         assert ("Verified:" in str(verified)) != is_less_certain
 
 
-def test_a_calibration_that_leaves_its_own_poses_no_smaller_error_is_said_to_be_no_improvement(four_sessions):
-    result = trihedron.calibrate(four_sessions[0], gravity_m_s2=G)
-    good = result.calibration
+def test_a_calibration_that_leaves_its_own_poses_no_smaller_error_is_said_to_be_no_improvement(first):
+    good = first.calibration
     bad = replace(good, accelerometer=replace(good.accelerometer, b=good.accelerometer.b + 1.0))
     for calibration, codes in ((good, []), (bad, ["worse-than-uncalibrated"])):
-        said = reference_findings(calibration, result.recording, result.segments)
+        said = reference_findings(calibration, first.recording, first.segments)
         assert [one.code for one in said] == codes
 
 
