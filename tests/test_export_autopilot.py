@@ -202,15 +202,6 @@ def test_polynomials_of_several_recordings_go_where_the_autopilot_has_places(tar
     assert_alike(made, trihedron.apply(known, recording), atol=3e-6)
 
 
-@pytest.mark.parametrize("target", ["c", "imu_tk", "xio"])
-def test_a_target_of_constants_says_what_the_temperature_is_worth(target):
-    known = by_temperature(diagonal_in(np.eye(3), log_of("px4", {}, "raw")))
-    text = export_calibration(known, target)
-    # 4e-4 rad/s a direction over 20 K is 0.23 deg/s.
-    assert "contains the gyroscope at 25.0 degC" in text
-    assert "0.229 deg/s of bias" in text
-
-
 def test_a_log_that_does_not_say_makes_the_export_ask_for_the_parameters(tmp_path, capsys):
     file = tmp_path / "unit.json"
     write_calibration(given(*[(1.01 * np.eye(3), np.full(3, 0.1))] * 2), file)

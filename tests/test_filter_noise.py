@@ -203,15 +203,6 @@ def test_an_n_that_is_uncertain_a_limit_the_references_or_below_the_quietest_is_
     assert any(words in f"{one.code} {one.seen}" for one in noticed_now) is is_said
 
 
-def test_a_warning_about_n_stands_in_the_file_as_on_the_screen(found):
-    gyro = replace(found.sensors[0], N=Bounded(N / 2.0, 0.45 * N, 0.55 * N), static=None)
-    said = next(one for one in noticed(gyro) if one.code == "filter-noise-below-quietest")
-    text = filter_noise_text(replace(both(found), findings=(said,)), "kalibr")
-    (line,) = [row for row in text.splitlines() if row.startswith("# warning:")]
-    assert f"by {gyro.quietest:.3g} in the filter" in line.replace("e-0", "e-")
-    assert text.isascii()
-
-
 def test_what_a_log_lacks_is_said_at_once():
     t = np.arange(6000) / 100.0
     swing = np.column_stack([np.sin(t), np.cos(1.3 * t), 0.1 * t])

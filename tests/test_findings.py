@@ -15,7 +15,6 @@ from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
 from trihedron.report.findings.phrases import PHRASES
 from trihedron.report.findings.wording import filled, places
-from trihedron.report.in_python import in_python
 
 
 @cache
@@ -139,11 +138,6 @@ def test_the_documents_list_the_catalogue_as_it_is():
 )
 def test_a_place_in_a_sentence_takes_si_and_says_its_unit_its_number_and_its_branch(place, value, said):
     assert filled(place, {"x": value}, {}) == said
-
-
-def test_in_python_a_sentence_names_parameters_and_a_command_stays_a_command():
-    said = in_python("Give --latitude DEG (and --height M), or run `trihedron calibrate LOG --latitude DEG`.")
-    assert said == "Give latitude_deg (and height_m), or run `trihedron calibrate LOG --latitude DEG`."
 
 
 def test_every_phrase_of_a_stage_is_in_the_catalogue_with_its_places_and_every_phrase_is_used():

@@ -35,20 +35,6 @@ def on_faces(recording, truth, turns_deg=None, **given):
     return calibrate(recording, segments=segments, **known)
 
 
-@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 19), marks=pytest.mark.slow)])
-def test_error_bars_cover_the_truth_at_their_stated_rate(seeds):
-    scores = []
-    for seed in seeds:
-        recording, truth = session(seed)
-        scores.append(z_scores(on_faces(recording, truth).gyroscope, truth)[[0, 4, 8, 9, 10, 11]])
-    scores = np.array(scores)
-    # Scales and biases, six a session, nearly independent: three binomial standard deviations. The bars of the other
-    # elements contain how far faces may be out of flat, and these are flat.
-    for level, expected in ((1.0, 0.683), (1.96, 0.95)):
-        margin = 3.0 * np.sqrt(expected * (1.0 - expected) / scores.size) + 0.02
-        assert abs(np.mean(np.abs(scores) < level) - expected) < margin
-
-
 def test_whole_turns_in_counts_are_recognised_and_stated_ones_need_no_nominal_scale():
     turns = (90.0, 1440.0, -1440.0)
     recording, truth = session(1, IN_COUNTS, unit="counts", turns_deg=turns, speed_deg_s=360.0)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import trihedron
 from hand_made_sessions import G, motion
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Severity
@@ -225,19 +224,3 @@ def test_devices_that_no_column_tells_apart_are_split_by_their_turn_where_no_row
     assert not serious(recording)
     with pytest.raises(ReadError, match="some are missing"):
         read_recording(written(tmp_path / "lost.csv", *np.delete(both, 2000, axis=0).T.tolist()), instance=2)
-
-
-def test_a_counter_of_a_byte_says_that_its_loss_is_the_least(tmp_path):
-    t, force, rate = motion()
-    kept = np.r_[0:800, 800 + 4 * 256 + 60 : len(t)]
-    count = [int(k) % 256 for k in kept]
-    log = written(tmp_path / "log.csv", *table(t[kept], force[kept], rate[kept])[1:], count, header=f"{HEADER[2:]},seq")
-    (lost,) = [f for f in read_recording(log, rate_hz=100.0).findings if f.code == "samples-lost"]
-    assert "at least 60 samples" in lost.seen
-
-
-def test_a_log_whose_time_counts_rows_says_so_where_its_calibration_is_refused(tmp_path):
-    t, force, rate = motion(n_poses=12)
-    log = written(tmp_path / "log.csv", *table(range(len(t)), force, rate), header=HEADER.replace("t,", "time,"))
-    with pytest.raises(ValueError, match=r"Poses found: \d\. .* taken as ms.*rate_hz if the column counts rows"):
-        trihedron.calibrate(str(log), gravity_m_s2=G)

@@ -115,13 +115,6 @@ def test_a_part_whose_log_is_in_si_has_the_steps_of_its_own_adc(tmp_path):
     assert accel.adc.high == pytest.approx(part.S[0][0] * part.adc.high, rel=0.01)
 
 
-def test_a_unit_of_a_part_without_tolerances_is_the_part():
-    part = profile_by_name("ideal")
-    for unit, nominal in zip(part.unit(7), (part.accelerometer, part.gyroscope), strict=True):
-        np.testing.assert_array_equal(unit.S, nominal.S)
-        np.testing.assert_array_equal(unit.b, nominal.b)
-
-
 def test_truth_is_written_whole(tmp_path):
     _, truth = simulate(scenario_by_name("imperfect"), seed=3)
     write_truth(truth, tmp_path / "truth.npz")
@@ -156,10 +149,3 @@ def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, 
         assert sentence in rejected(capsys, "simulate", *words)
     assert main(["simulate", str(written(tmp_path, EXAMPLE)), "-o", str(tmp_path / "c.parquet")]) == 0
     assert not (tmp_path / "b.csv").exists()
-
-
-def test_the_scenario_to_begin_with_is_a_whole_one_and_is_not_written_over(tmp_path, capsys):
-    begun = tmp_path / "sensor.toml"
-    assert main(["simulate", "--template", str(begun)]) == 0
-    assert simulate(read_scenario(begun), 1)[0].n_samples > 1000
-    assert "left alone" in rejected(capsys, "simulate", "--template", begun)
