@@ -256,7 +256,6 @@ def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, c
         assert lacks in said
 
 
-@pytest.mark.usefixtures("few_simulations")
 def test_gravity_is_that_of_the_scenario_unless_given():
     """A simulation at the pole, and a log of it: with standard gravity on one side scales would differ by 0.3 %."""
     at_the_pole = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=9, pose_s=2.0, move_s=1.0))
