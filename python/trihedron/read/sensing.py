@@ -198,16 +198,22 @@ def judge_gyroscope(
     return Judged(unit, (found,))
 
 
+_RATES = (
+    (RateUnit.RAD_S, 0.1, 70.0),
+    (RateUnit.DEG_S, 20.0, 4000.0),
+    (RateUnit.MRAD_S, 200.0, 70e3),
+    (RateUnit.MDEG_S, math.inf, math.inf),
+)
+"""Units, the largest the first, with what a static gyro reads at most (its bias, for MEMS below about 10 deg/s), and
+what any does: no MEMS measures more than 4000 deg/s."""
+
+
 def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:
     largest = float(np.nanmax([max(high, -low) for low, _, high, _ in extremes]))
     rest = largest
     if windows is not None:
         rest = float(np.median(np.abs(windows.quiet_mean("gyroscope")).max(axis=1)))
-    # A static gyro reads its bias, for MEMS below about 10 deg/s (0.2 rad/s, 200 mrad/s); none measures 40 rad/s.
-    if largest > 40.0:
-        unit = RateUnit.MRAD_S if rest > 20.0 else RateUnit.DEG_S
-    else:
-        unit = RateUnit.RAD_S if rest < 0.1 else RateUnit.DEG_S
+    unit = next(one for one, at_rest, most in _RATES if not (rest >= at_rest or largest > most))
     return Judged(unit, (Finding.of("unit-assumed", "gyro", static=rest, largest=largest, unit=unit.value),))
 
 
