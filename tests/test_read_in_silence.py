@@ -144,6 +144,20 @@ def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_
     assert "devices-interleaved" in serious(bare)
 
 
+@pytest.mark.parametrize("every", [2, 4])
+def test_mains_hum_near_a_fraction_of_the_sampling_rate_is_one_device_and_a_rigid_pair_two(tmp_path, every):
+    t, force, rate = motion(n_poses=12)
+    noise = np.random.default_rng(4).standard_normal((2, *force.shape))
+    frequency_hz = 1.0 / every / np.median(np.diff(t)) + 0.02
+    hum = 0.15 * np.sin(2.0 * np.pi * frequency_hz * t)[:, None] * [1.0, -0.5, 0.8]
+    recording = read_recording(written(tmp_path / "hum.csv", *table(t, force + hum + 0.02 * noise[0], rate)))
+    assert "devices-interleaved" not in serious(recording)
+    # Of one kind, side by side on a board: they differ by bias and scale alone.
+    pair = np.where(np.arange(len(t))[:, None] % every == 0, 1.01 * force + 0.15, force) + 0.02 * noise[1]
+    recording = read_recording(written(tmp_path / "pair.csv", *table(t, pair, rate)))
+    assert "devices-interleaved" in serious(recording)
+
+
 @pytest.mark.parametrize("kind", [-0.5, 0.9, "toggles"])
 def test_noise_that_alternates_and_readings_that_toggle_between_two_steps_are_one_device(tmp_path, kind):
     t, force, rate = motion()

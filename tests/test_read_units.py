@@ -75,10 +75,14 @@ def test_a_still_log_leaves_the_gyro_unit_a_guess_and_one_without_gravity_is_ser
     assert not {"stuck-values", "unit-contradicted"} & {*codes(recording)}
 
 
-
 @pytest.mark.parametrize(
     ("per_rad_s", "unit"),
-    [(1.0, RateUnit.RAD_S), (180 / math.pi, RateUnit.DEG_S), (1e3, RateUnit.MRAD_S), (180e3 / math.pi, RateUnit.MDEG_S)],
+    [
+        (1.0, RateUnit.RAD_S),
+        (180 / math.pi, RateUnit.DEG_S),
+        (1e3, RateUnit.MRAD_S),
+        (180e3 / math.pi, RateUnit.MDEG_S),
+    ],
 )
 def test_a_guessed_gyro_unit_leaves_its_bias_and_its_fastest_turn_those_of_a_gyro(tmp_path, per_rad_s, unit):
     time_s, force, rate = (part[:200].copy() for part in motion(RATE_HZ, 3, 1, 1.0))
@@ -88,6 +92,7 @@ def test_a_guessed_gyro_unit_leaves_its_bias_and_its_fastest_turn_those_of_a_gyr
     recording = read_recording(saved(tmp_path / "log.csv", time_s, force, rate * per_rad_s))
     assert recording.gyroscope_unit is unit
     assert finding(recording, "unit-assumed").severity is Severity.WARNING
+
 
 @pytest.mark.parametrize("gyro_first", [False, True])
 @pytest.mark.parametrize("n_poses", [1, 6])

@@ -246,6 +246,11 @@ _CLEAR = 6.0
 """Threshold, in standard errors, of the median difference between the rows of one device and the others in quiet
 blocks; a single sensor's white noise gives 0.7, alternating noise (autocorrelation -0.5) 1.3."""
 _SAME_SIGN = 0.9
+_NEXT, _STAY = 4, 32
+"""Distance of blocks up to which they follow each other, and the most of one stay in which a bias does not drift."""
+_SLOW, _CHANCE = 0.002, 1.4
+"""Share of slow changes above which a contrast is not constant in a stay (mains of 50 ± 0.02 Hz have 0.01 to 0.02), and
+the ratio of variances that white noise does not exceed in most stays."""
 
 
 def n_interleaved(readings: FloatArray) -> int:
@@ -274,7 +279,22 @@ def _takes_turns(parts: FloatArray, k: int) -> bool:
     classes = parts[quiet].reshape(len(quiet), n, k, -1).mean(axis=1)
     contrast = classes[:, 0] - classes[:, 1:].mean(axis=1)
     error = np.sqrt((noise[quiet] ** 2 + step**2 / 12.0) * (1.0 + 1.0 / (k - 1)) / n)
-    score = np.abs(contrast) / np.where(error > 0.0, error, np.inf)
+    score = np.median(np.abs(contrast) / np.where(error > 0.0, error, np.inf), axis=0)
     same = np.mean(np.sign(contrast[1:]) == np.sign(contrast[:-1]), axis=0)
-    far = (np.median(score, axis=0) > _CLEAR) & (np.median(np.abs(contrast), axis=0) > 2.0 * step)
-    return bool(np.any(far & (same > _SAME_SIGN)))
+    far = (score > _CLEAR) & (np.median(np.abs(contrast), axis=0) > 2.0 * step) & (same > _SAME_SIGN)
+    clearest = int(np.argmax(np.where(far, score, 0.0)))
+    return bool(far[clearest] and _slow_share(contrast[:, clearest], quiet) < _SLOW)
+
+
+def _slow_share(contrast: FloatArray, quiet: IntArray) -> float:
+    """Share of the mean square of contrasts (m,) that changes slowly from block to block of one stay: where ``quiet``
+    (m,) blocks follow each other.
+
+    Devices at rest differ by constants; a vibration near a half (third, quarter) of the sampling rate by its phase.
+    """
+    stays = np.split(contrast, np.flatnonzero(np.diff(quiet) > _NEXT) + 1)
+    parts = [part for stay in stays for k in range(0, len(stay), _STAY) if len(part := stay[k : k + _STAY]) > 2]
+    parts = [part for part in parts if part.any()]
+    # Of white noise the variance is half the mean square of differences.
+    slow = [part.var(ddof=1) - _CHANCE * 0.5 * np.mean(np.diff(part) ** 2) for part in parts]
+    return float(np.median(slow / np.array([np.mean(part**2) for part in parts]))) if parts else 0.0
