@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from diagnosed_session import nearest_pose, simulated
 from small_session import G
@@ -13,6 +14,8 @@ from trihedron import calibrate, diagnose, verify
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import _folds, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
+from trihedron.estimate.session.observed import turned_with_earth
+from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_up
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
 from trihedron.report.calibration_fit import figures_table
@@ -276,3 +279,18 @@ def test_gravity_errors_of_a_joint_fit_have_the_degrees_of_freedom_that_moves_le
 )
 def test_few_poses_are_consistent_only_where_they_determine_the_model(n_poses: int, verdict: str) -> None:
     assert diagnose(_drawn(n_poses, 7001), **GRAVITY).verdict == verdict
+
+
+@pytest.mark.parametrize("latitude_deg", [60.0, -20.0, None])
+def test_the_earth_rate_that_a_pose_of_unknown_heading_reads_is_in_the_error_of_its_mean(latitude_deg):
+    rng = np.random.default_rng(8)
+    S = np.radians(np.diag([0.9, 1.1, 1.0]) + 0.1 * rng.standard_normal((3, 3)))
+    body = Rotation.random(200_000, random_state=8)
+    up = body.inv().apply([0.0, 0.0, 1.0])
+    # At any place: latitudes are uniform over the sphere.
+    latitude = np.arcsin(rng.uniform(-1.0, 1.0, len(up))) if latitude_deg is None else np.radians(latitude_deg)
+    world = np.stack(np.broadcast_arrays(np.cos(latitude), 0.0 * up[:, 0], np.sin(latitude)), axis=1)
+    read = EARTH_RATE_RAD_S * body.inv().apply(world) - earth_rate_up(latitude_deg) * up
+    variance = turned_with_earth(latitude_deg, up, S)
+    # Of 200 000 poses the mean square is certain to 0.5 %.
+    np.testing.assert_allclose(np.mean((read @ np.linalg.inv(S).T) ** 2, axis=0), variance.mean(axis=0), rtol=0.02)

@@ -53,6 +53,14 @@ def earth_rate_up(latitude_deg: float | None) -> float:
     return 0.0 if latitude_deg is None else earth_rate_north_up(latitude_deg)[1]
 
 
+def unknown_earth_rate(latitude_deg: float | None) -> tuple[float, float]:
+    """Standard deviations [rad/s] of what is not known of the Earth's rotation in a body of any heading: across the
+    vertical and along it, at a latitude [deg]; at any place where none is stated."""
+    if latitude_deg is None:
+        return EARTH_RATE_RAD_S / math.sqrt(3.0), EARTH_RATE_RAD_S / math.sqrt(3.0)
+    return earth_rate_north_up(latitude_deg)[0] / math.sqrt(2.0), 0.0
+
+
 def earth_rate_north_up(latitude_deg: float) -> tuple[float, float]:
     """Northward and upward components [rad/s] of the Earth's rotation at a latitude [deg]."""
     latitude = math.radians(latitude_deg)

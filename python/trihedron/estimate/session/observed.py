@@ -10,7 +10,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.gravity import earth_rate_up
+from trihedron.gravity import earth_rate_up, unknown_earth_rate
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
@@ -127,6 +127,9 @@ def arranged(
         seen = pose_rate, own["pose_rate_sigma"], unresolved, moves_before
         pose_rate, own["pose_rate_sigma"], unresolved = support.applied(*seen, near[2])
         leans = support.leans
+    # The heading of a pose is unknown, and so is the horizontal part of the Earth's rotation in its axes.
+    turned = turned_with_earth(recording.latitude_deg, up, near[2])
+    own["pose_rate_sigma"] = np.sqrt(own["pose_rate_sigma"] ** 2 + turned)
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
         time_s=measured.time_s,
@@ -150,6 +153,13 @@ def arranged(
         effect_force=np.concatenate([measured.reading, readings[kept]]) - force_origin,
         n_hidden=len(coarse), earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
+
+
+def turned_with_earth(latitude_deg: float | None, up: FloatArray, S: FloatArray) -> FloatArray:
+    """Variance (n, 3), raw, that the Earth's rotation adds to the mean rates of poses with directions ``up`` (n, 3)."""
+    across, along = np.square(unknown_earth_rate(latitude_deg))
+    inverse = np.linalg.inv(S)
+    return np.asarray(across * np.sum(inverse**2, axis=1) + (along - across) * (up @ inverse.T) ** 2)
 
 
 def _effects(
