@@ -1,7 +1,6 @@
-"""Column names, units and order by what names mean and readings can only be; a temperature; axes that change."""
+"""Column names, units and order by what names mean and readings can only be; a temperature."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -336,51 +335,3 @@ def test_readings_of_a_thermometer_that_does_not_answer_are_left_out():
     assert np.isnan(found[::37][:40]).all()
     assert np.nanmin(found) == 22.0
     assert "temperature-implausible" in findings
-
-
-FLIP_Y = np.diag([1.0, -1.0, 1.0])
-EXCHANGE = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
-
-def changes(change, sensor, at=0.5, seed=1, bias=0.0):
-    """Findings on a log whose readings of one sensor are multiplied by ``change`` (3, 3) from a part of it on."""
-    t, force, rate = motion(50.0, seed, n_poses=14)
-    k = round(at * len(t))
-    readings = {"acc": force, "gyr": rate + np.array(bias)}
-    readings[sensor][k:] = readings[sensor][k:] @ np.asarray(change).T
-    found = trihedron.read({"time_s": t, **readings}).findings
-    return t[k], [f for f in found if f.severity is Severity.SERIOUS]
-
-
-@pytest.mark.parametrize("at", [0.3, 0.5, 0.75])
-@pytest.mark.parametrize(
-    ("sensor", "change", "words"),
-    [
-        ("gyr", FLIP_Y, r"axes of the gyro change .* Y reads what −Y read"),
-        ("acc", FLIP_Y, "axes of the accelerometer change .* Y reads what −Y read"),
-        ("gyr", EXCHANGE, "axes of the gyro change .* X reads what Y read, Y reads what X read"),
-        ("gyr", 2.0 * np.eye(3), "scale of the gyro changes .* reads 2 times"),
-        ("acc", 0.5 * np.eye(3), "scale of the accelerometer changes .* reads 0.5 times"),
-    ],
-)
-def test_axes_or_a_scale_that_change_inside_a_log_are_one_serious_finding_with_axis_and_time(at, sensor, change, words):
-    at_s, found = changes(change, sensor, at)
-    (one,) = found
-    assert one.code == "axes-changed"
-    assert re.search(words, one.seen)
-    # Poses of 2.5 s and moves of 1.5 s: a move that the change leaves as it is lies on either side.
-    assert one.numbers["from_s"] - 4.0 <= at_s <= one.numbers["to_s"] + 4.0
-    assert one.numbers["to_s"] - one.numbers["from_s"] < 8.0
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_axes_that_do_not_change_are_not_reported(seed):
-    assert not changes(np.eye(3), "gyr", seed=seed)[1]
-    # Axes of other directions than the names say are alike throughout.
-    assert not changes(EXCHANGE, "gyr", 0.0, seed)[1]
-
-
-def test_axes_that_change_beside_a_bias_that_turns_as_far_as_a_move_are_found():
-    # 10 °/s, some 15° in a move.
-    _, (one,) = changes(FLIP_Y, "gyr", bias=(0.15, -0.1, 0.12))
-    assert one.code == "axes-changed"

@@ -34,7 +34,7 @@ DISTURBED = 0.05
 BLOCK_S, STEADY_S, LONGEST_S = 0.1, 0.5, 30.0
 """Duration of a block, the shortest of an interval of constant gravity, and the longest of a move."""
 STEADY = 0.02
-"""Largest change from one block of such an interval to the next, as a fraction of gravity."""
+"""Largest change over the shortest of such intervals, as a fraction of gravity."""
 FEW = 3
 """Blocks of an interval that are averaged beside a move."""
 LEVELS = (0.1, 0.5, 0.9)
@@ -150,7 +150,8 @@ class Change:
 class Intervals:
     """Intervals of constant gravity, in blocks of ``length`` samples.
 
-    ``edges`` (k, 2) are the first and the last block of each.
+    ``edges`` (k, 2) are the first and the last block of each; ``calm`` (c, 2) those of intervals that may contain slow
+    rotations too, in which the ``norm`` (c,) is that of gravity.
     """
 
     def __init__(self, accelerometer: FloatArray, rate_hz: float) -> None:
@@ -159,14 +160,23 @@ class Intervals:
         force = self.blocks(accelerometer)
         norm = np.linalg.norm(force, axis=1)
         self.up = force / np.where(norm > 0.0, norm, np.nan)[:, None]
-        is_steady = np.linalg.norm(np.diff(force, axis=0), axis=1) < STEADY * norm[1:]
-        bounds = np.diff(np.concatenate([[False], is_steady, [False]]).astype(np.int8))
-        edges = np.flatnonzero(bounds).reshape(-1, 2)
-        self.edges = edges[edges[:, 1] - edges[:, 0] + 1 >= max(FEW, round(STEADY_S / self.step_s))]
-        self.norm = norm[self.edges].mean(axis=1)
+        self.calm = self._edges(force, norm, 0)
+        # Over half a second, because from one block to the next slow rotations look like rest.
+        self.edges = self._edges(force, norm, round(0.5 * STEADY_S / self.step_s))
+        self.norm = norm[self.calm].mean(axis=1)
         # Offsets (of counts about the middle of a range) change directions as much as norms.
         apart = np.abs(np.log(self.norm / np.median(self.norm))) if len(self.norm) else np.zeros(1)
         self.direction = math.hypot(DIRECTION, float(np.median(apart)) / math.sqrt(MEDIAN_CHI2[1]))
+
+    def _edges(self, force: FloatArray, norm: FloatArray, reach: int) -> IntArray:
+        """First and last blocks (k, 2) of intervals in which means (n, 3) stay the same ``reach`` blocks to either
+        side."""
+        steps = np.arange(len(force) - 1)
+        across = force[np.minimum(steps + 1 + reach, len(steps))] - force[np.maximum(steps - reach, 0)]
+        is_steady = np.linalg.norm(across, axis=1) < STEADY * norm[1:]
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], is_steady, [False]]).astype(np.int8))).reshape(-1, 2)
+        least = max(FEW, round(STEADY_S / self.step_s) - 2 * reach)
+        return edges[edges[:, 1] - edges[:, 0] + 1 >= least]
 
     def blocks(self, readings: FloatArray) -> FloatArray:
         """Means (n, 3) of blocks."""
@@ -185,7 +195,7 @@ class Intervals:
 
 def changed_norm(found: Intervals) -> list[Change]:
     """Changes of the accelerometer's scale."""
-    if len(found.edges) < 2:
+    if len(found.calm) < 2:
         return []
     ratios = np.array(_both_ways(FORCE_RATIOS))
     density = -math.log(NORM * math.sqrt(2.0 * math.pi))
@@ -197,7 +207,7 @@ def changed_norm(found: Intervals) -> list[Change]:
     best = max(paths, key=lambda path: path.score)
     return [
         Change(
-            found.samples(int(found.edges[a, 1]), int(found.edges[b, 0])),
+            found.samples(int(found.calm[a, 1]), int(found.calm[b, 0])),
             float(ratios[best.state[b]] / ratios[best.state[a]]),
         )
         for a, b in best.steps()
