@@ -52,7 +52,8 @@ def calibrate(
     ----------
     recording : Recording, or what trihedron.read takes
         Without a gyro the accelerometer is calibrated alone.
-    segments : Segments, found when not given
+    segments : Segments
+        Found when not given.
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place. Without it 9.80665 m/s² is used, and a finding states the possible error.
     method : "joint", "separate" or "faces"
@@ -75,8 +76,10 @@ def calibrate(
     reference : path, Recording or ReferenceMotion
         Known motion beside the log (rate table, optical tracking, another unit): both sensors are calibrated by it, and
         static poses are not needed.
-    reference_columns : str, its columns where names do not state them
-    progress : callable, called with the share done (0 to 1) and what is being done
+    reference_columns : str
+        Its columns where names do not state them.
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

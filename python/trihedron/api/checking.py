@@ -27,7 +27,8 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     ----------
     recording : Recording, or what trihedron.read takes
         The log to check.
-    progress : callable, called with the share done (0 to 1) and what is being done
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

@@ -47,7 +47,8 @@ def demo(
         Where logs, calibrations and reports go.
     seed : int
         Draws the unit and the effect of the second act.
-    overwrite : bool, whether files of a folder that exists are replaced
+    overwrite : bool
+        Whether files of a folder that exists are replaced.
 
     Returns
     -------

@@ -36,10 +36,12 @@ def diagnose_sessions(
     ----------
     recordings : sequence of Recording, or what trihedron.read takes
         Two or more of the same unit.
-    gravity_m_s2 or latitude_deg, height_m : float, as for :func:`calibrate`
+    gravity_m_s2 or latitude_deg, height_m : float
+        As for :func:`calibrate`.
     alpha : float
         Probability that healthy recordings are said to share an effect.
-    progress : callable, called with the share done (0 to 1) and what is being done
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

@@ -49,7 +49,8 @@ def export(
         (.param, .parm, QGroundControl's .params); "none" where the readings were raw.
     output : path, optional
         Where to write; each of several files gets its own ending.
-    overwrite : bool, whether a file that exists is replaced
+    overwrite : bool
+        Whether a file that exists is replaced.
 
     Returns
     -------

@@ -33,7 +33,8 @@ def extend(
         Of :func:`trihedron.calibrate`, in the lower-triangular frame.
     alpha : float
         False-alarm probability of the diagnosis.
-    progress : callable, called with the share done (0 to 1) and what is being done
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

@@ -70,7 +70,8 @@ def filter_noise(
         the longest static interval of the log, if it lasts 20 s.
     reference : path, Recording or ReferenceMotion, optional
         Attitude, and with a position also for the accelerometer. Without it only static intervals and gravity are used.
-    reference_columns : str, its columns where names do not state them
+    reference_columns : str
+        Its columns where names do not state them.
     band_hz : float, optional
         Vibration is measured above this frequency; a quarter of the sampling rate by default.
     horizons_s : sequence of float

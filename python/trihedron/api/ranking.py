@@ -50,9 +50,12 @@ def rank(
     ----------
     calibrations : sequence of calibration, result or path
     recording : Recording, or what trihedron.read takes
-    gravity_m_s2 or latitude_deg, height_m : float; by default that of the trihedron calibrations
-    segments : Segments, found when not given
-    progress : callable, called with the share done (0 to 1) and what is being done
+    gravity_m_s2 or latitude_deg, height_m : float
+        By default that of the trihedron calibrations.
+    segments : Segments
+        Found when not given.
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

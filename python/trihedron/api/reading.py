@@ -58,7 +58,8 @@ def read(
         Which topic, dataset or member of a file with several.
     instance : int or str
         Which of several IMUs in one file.
-    progress : callable, called with the share done (0 to 1) and what is being done
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
@@ -135,7 +136,8 @@ def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Seg
     ----------
     recording : Recording, or what trihedron.read takes
         Readings of one or both sensors.
-    progress : callable, called with the share done (0 to 1) and what is being done
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
@@ -172,7 +174,8 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
         What to write.
     output : file
         ``.csv``, ``.npz`` or ``.parquet``.
-    overwrite : bool, whether a file that exists is replaced
+    overwrite : bool
+        Whether a file that exists is replaced.
     options
         Of :func:`trihedron.read`.
 

@@ -53,10 +53,12 @@ def calibrate_references(
         One unit, moved in any way.
     references : sequence of path, Recording or ReferenceMotion
         Known motion beside each (docs/reference.md).
-    reference_columns : str, their columns where names do not state them
+    reference_columns : str
+        Their columns where names do not state them.
     frame : "lower", "symmetric" or "case"
         Body frame; ``case`` is that of the reference.
-    gravity_m_s2 or latitude_deg, height_m : float, as for :func:`calibrate`
+    gravity_m_s2 or latitude_deg, height_m : float
+        As for :func:`calibrate`.
 
     Returns
     -------

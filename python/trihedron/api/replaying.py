@@ -42,7 +42,8 @@ def guide(
         Poses and moves.
     accuracy : str
         When to stop: ``"accel 0.05 %, gyro 0.1 %"``.
-    gravity_m_s2 or latitude_deg, height_m : float, as for :func:`calibrate`
+    gravity_m_s2 or latitude_deg, height_m : float
+        As for :func:`calibrate`.
     on_pose : callable, optional
         Called with the guide's view (instruction, next pose, uncertainties) after every pose.
 

@@ -9,6 +9,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Literal, get_args
 
+import numpy as np
+
 from trihedron.api.calibrating import calibrate
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.api.sessions_combined import amount_of, combine
@@ -55,12 +57,14 @@ def calibrate_sessions(
         through all of them.
     labels : sequence of str, optional
         One word per recording, instead of its date or device.
-    gravity_m_s2 or latitude_deg, height_m : float, as for :func:`calibrate`
+    gravity_m_s2 or latitude_deg, height_m : float
+        As for :func:`calibrate`.
     frame : "lower" or "symmetric"
         Body frame of the common calibration.
     alpha : float
         Probability that any parameter of a unit that did not change is called changed.
-    progress : callable, called with the share done (0 to 1) and what is being done
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------

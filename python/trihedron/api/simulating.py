@@ -76,7 +76,8 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
         A session with poses and both sensors.
     calibration : result of a calibration, Calibration or file
         Of its unit.
-    seed : int, of the noise
+    seed : int
+        Of the noise.
 
     Returns
     -------

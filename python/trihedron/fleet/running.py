@@ -61,7 +61,8 @@ def fleet(
         Regular expression whose group names the device in a log's path; else archives number them, else folders do.
     gravity_m_s2 or latitude_deg, height_m, columns, rate_hz, accelerometer_unit, gyroscope_unit
         As for :func:`trihedron.calibrate` and :func:`trihedron.read`; the same for all logs.
-    progress : callable, called with the share done (0 to 1) and what is being done
+    progress : callable
+        Called with the share done (0 to 1) and what is being done.
 
     Returns
     -------
