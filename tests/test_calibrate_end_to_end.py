@@ -168,7 +168,7 @@ def test_a_defect_inside_a_fit_is_an_error_and_a_refusal_leaves_the_gyro_out(fit
         def raising(*_, **__):
             raise error
 
-        monkeypatch.setattr(calibrating, fit, raising)
+        monkeypatch.setattr(calibrating_methods, fit, raising)
         return calibrate(recording, method=method, gravity_m_s2=9.81)
 
     with pytest.raises(ValueError, match="broadcast"):
