@@ -13,10 +13,10 @@ from diagnosed_session import diagnosed, unit_of
 from small_session import SCENARIO, G, made_once, rejected
 from trihedron.api.diagnosing_with_simulation import gravity_of_scenario
 from trihedron.cli import main
+from trihedron.comparison.effects import compare_effects
+from trihedron.comparison.fitted import FittedModel, FittedSensor, model_of_diagnosis
 from trihedron.comparison.model import _with_shared_effects
-from trihedron.diagnose.against.fitted import FittedModel, FittedSensor, model_of_diagnosis
-from trihedron.diagnose.against.mechanisms import compare_effects
-from trihedron.diagnose.against.numbers import compare_numbers
+from trihedron.comparison.parameters import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.report.diagnosis import diagnosis_report

@@ -12,8 +12,8 @@ import trihedron
 from test_diagnose_against import fitted
 from trihedron.comparison.frames import carried_gravity, rates_of_world, sign_of_gravity
 from trihedron.comparison.noise import compare_noise, sampled
+from trihedron.comparison.parameters import compare_numbers
 from trihedron.comparison.slow import correlation_times
-from trihedron.diagnose.against.numbers import compare_numbers
 from trihedron.records import Pose, Recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 

@@ -13,10 +13,10 @@ from diagnosed_session import unit_of
 from trihedron.api import improving
 from trihedron.api.driving import MovedAlike, _matched, bias_scatter
 from trihedron.channel_facts.low_pass import gain_of
+from trihedron.comparison.fitted import model_of_calibration
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.noise import sampled as sampled_of
 from trihedron.comparison.quantisation import quantisation_noise, white_and_quantisation
-from trihedron.diagnose.against.fitted import model_of_calibration
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Recording
 from trihedron.simulate import NoiseTerms, Smoother, hand_session, low_pass_like, make_noise, noise_of_octaves, simulate

@@ -9,6 +9,7 @@ from trihedron.api.calibrating import calibrate
 from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import accelerometer_only, read, segment
 from trihedron.api.simulating import names_scenario, scenario_of
+from trihedron.comparison.fitted import as_read, model_of_diagnosis
 from trihedron.comparison.frames import judged_by_motion, rates_of_world, sign_of_gravity
 from trihedron.comparison.model import compared, with_noise_stage
 from trihedron.comparison.noise import Sampled, compare_noise, sampled
@@ -16,7 +17,6 @@ from trihedron.comparison.quantisation import quantisation_noise
 from trihedron.comparison.ranges import stated_ranges
 from trihedron.comparison.slow import correlation_times, slow_noise
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.against.fitted import as_read, model_of_diagnosis
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Finding, Recording, Segments

@@ -14,11 +14,11 @@ import numpy as np
 from trihedron.api.driving import SCATTER, MovedAlike, bias_scatter, flicker_of_poses
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.low_pass import gain_of
+from trihedron.comparison.fitted import model_of_diagnosis
 from trihedron.comparison.frames import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
 from trihedron.comparison.quantisation import white_and_quantisation
 from trihedron.comparison.ranges import SENSOR
-from trihedron.diagnose.against.fitted import model_of_diagnosis
 from trihedron.documents import parse_toml
 from trihedron.files.scenario import improved_scenario
 from trihedron.records.pose_noise import PoseNoise

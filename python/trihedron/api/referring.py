@@ -11,8 +11,8 @@ import numpy as np
 
 from trihedron.api.reading import read
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.against.fitted import FittedModel, FittedSensor, model_of_calibration
-from trihedron.diagnose.against.numbers import compare_numbers
+from trihedron.comparison.fitted import FittedModel, FittedSensor, model_of_calibration
+from trihedron.comparison.parameters import compare_numbers
 from trihedron.errors import InputError
 from trihedron.estimate.reference import fit_reference, turns_of_frame
 from trihedron.read import ReadError

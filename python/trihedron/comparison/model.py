@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray, rms_of
+from trihedron.comparison.effects import FREE_CURVES, compare_effects, left_open_by
+from trihedron.comparison.fitted import FittedModel, model_of_calibration, model_of_diagnosis
 from trihedron.comparison.noise import Sampled, sampled
+from trihedron.comparison.parameters import CommonFactor, compare_numbers
 from trihedron.comparison.rows import SENSORS, difference
-from trihedron.diagnose.against.fitted import FittedModel, model_of_calibration, model_of_diagnosis
-from trihedron.diagnose.against.mechanisms import FREE_CURVES, compare_effects, left_open_by
-from trihedron.diagnose.against.numbers import CommonFactor, compare_numbers
 from trihedron.probability import f_upper
 from trihedron.records import Calibration, Recording, Segments, Verification
 from trihedron.records.diagnosis import (

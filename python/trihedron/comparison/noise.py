@@ -8,8 +8,8 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
+from trihedron.comparison.fitted import FittedModel
 from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, difference, measured_row
-from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.probability import chdtrc

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from trihedron.arrays import AXES
-from trihedron.diagnose.against.mechanisms import CODE, FRAME_TOLERANCE
+from trihedron.comparison.effects import CODE, FRAME_TOLERANCE
 from trihedron.records import Recording
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.sensor_model import correct

@@ -8,9 +8,9 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.pooled import ratio_of
+from trihedron.comparison.effects import FREE_CURVES
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.rows import NAMES, SENSORS, UNIT, Sensor, measured_row, remarked
-from trihedron.diagnose.against.mechanisms import FREE_CURVES
 from trihedron.estimate.noise.slow import PoseBiases, SlowDifference, compare_slow, correlation_time
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm

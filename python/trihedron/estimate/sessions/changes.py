@@ -22,7 +22,7 @@ from trihedron.transforms import directions_of
 
 SPREAD_DOF, DRIFT_DOF = 25.0, 5.0
 """Degrees of freedom per session of its covariance and of its bias drift: some 25 poses, and half of that measured for
-the drift of a pair of sessions (:mod:`trihedron.diagnose.against.numbers`). The inverse of an estimated covariance is
+the drift of a pair of sessions (:mod:`trihedron.comparison.parameters`). The inverse of an estimated covariance is
 too large by ν/(ν - 2) on average; the weights are reduced by it, or 3.5 % of units with ten sessions would be reported
 as changed instead of 1 %."""
 RIDGE = 1e-9

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import AXES, TINY, FloatArray, rms_of, sigmas_of
-from trihedron.diagnose.against.fitted import FittedModel, FittedSensor
+from trihedron.comparison.fitted import FittedModel, FittedSensor
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.probability import STRONG, chdtri, fdtrc
 from trihedron.records.diagnosis import RELATIVE, ParameterDifference

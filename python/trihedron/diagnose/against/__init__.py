@@ -1,1 +1,0 @@
-"""A given model compared with a recording: parameters first, then effects."""
