@@ -22,7 +22,7 @@ from trihedron.diagnose.relations.search import Related
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
 from trihedron.diagnose.residuals.within_poses import judge_within_poses, within_limit
-from trihedron.diagnose.sample_evidence import Observed, look
+from trihedron.diagnose.sample_evidence import look
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
@@ -140,7 +140,7 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     predicted, settles = _on_support(tune_noise(obs, start, prior), start, alpha)
     context = Context(predicted)
     notify(0.2, "looking at the samples")
-    observed, known = look(Observed(predicted.obs, predicted), context, alpha, start)
+    observed = look(context, alpha)
     # The same bounds of noise as beside the effects: what these do not explain is not cleared by them.
     plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
     of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.found.values())
@@ -155,7 +155,7 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     judged = again(found.model, found.model.terms, noise_bounds(found.model.obs, tuple(one.effect for one in biases)))
     numbers = with_shapes(renewed(found.model))
     answer = Answer(
-        plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, known, domains
+        plain.fitted, bare, found, numbers, biases, observed.seen, judged.fitted, asked, observed.tested, domains
     )  # fmt: skip
     if "accel-hysteresis" in answer.ids:
         settles = {domain: p for domain, p in settles.items() if domain != "within-static"}
@@ -193,7 +193,7 @@ def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, floa
 def _judge_timing(context: Context, alpha: float, every: Iterable[Evidence]) -> DomainTest:
     """Chi-square: squared z of the common time error, plus the gain of lost samples; p-value of their own tests.
 
-    ``every`` evidence in the samples that improves the prediction of held-out moves: jolts look like lost samples.
+    ``every`` evidence in the samples counts.
     """
     value, spread, n = common_time_variance(context.obs)
     if not np.isfinite(spread):

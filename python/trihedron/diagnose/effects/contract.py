@@ -167,8 +167,6 @@ class Evidence:
     ``p_value`` is not corrected for the number of effects tested; ``held_out`` compares before and after on data that
     the parameters were not fitted to; ``reweigh`` changes the observations (noise, excluded moves), or is None;
     ``strength`` is the gain in twice a log-likelihood, for ranking.
-    ``begins`` are the poses at which the moves begin whose readings ``reweigh`` changes, ``None`` for all: these moves
-    must improve.
     ``share`` is the share of its domain's misfit that it explains, for effects that do not show in poses and moves.
     ``statement`` is the catalogue's (:meth:`Effect.reported`), or that of a user's own effect.
     ``restate`` gives the parameters again from the session fitted with ``reweigh`` applied.
@@ -184,7 +182,6 @@ class Evidence:
     reweigh: Callable[[Observations], Observations] | None = None
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
     share: float | None = None
-    begins: frozenset[int] | None = None
 
     def __post_init__(self) -> None:
         """Keep the p-value where its logarithm exists."""
@@ -193,9 +190,6 @@ class Evidence:
 
 class DirectEffect(Effect):
     """An effect detected by a test on the samples, with evidence of its own, not by columns over poses."""
-
-    is_proof: ClassVar[bool] = False
-    """Whether the samples alone prove it (a range limit); otherwise its correction must improve held-out moves."""
 
     @abstractmethod
     def find(self, context: Context) -> Evidence | None:

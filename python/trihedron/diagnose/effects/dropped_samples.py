@@ -8,19 +8,18 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import MOST_NAMED, DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
-from trihedron.diagnose.session.inserted_samples import insert_samples, moved, with_inserted
-from trihedron.diagnose.session.observations import Observations, observe
-from trihedron.diagnose.session.solve import fit, move_residuals
-from trihedron.probability import CLEAR, LN_FAULT, chdtri
+from trihedron.diagnose.hypothesis import hypothesis
+from trihedron.diagnose.session.lost_samples import with_gaps, with_inserted
+from trihedron.diagnose.session.observations import Observations
+from trihedron.diagnose.session.solve import move_residuals
+from trihedron.probability import LN_FAULT, chdtri
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.joints import joints, most_lost
-from trihedron.session.model import Prior, SessionState
+from trihedron.session.model import SessionState
 
 ROWS = 5
 """Rows of a move: gravity after it, velocity over it."""
-CONTRADICTS, FEWEST_MOVES = 10.0, 3
-"""Misfit, in medians of all moves, above which a move contradicts the session: by chance one in thirty million."""
 MOST_OF_INTERVALS = 0.02
 """Share of intervals with losses above which they are not single losses: the clock or the motion is different."""
 
@@ -38,7 +37,7 @@ class Loss:
 
 
 def find_losses(obs: Observations) -> list[Loss]:
-    """Intervals where the motion on either side joins only if samples are inserted (eq. 8.16), move after move."""
+    """Intervals where the motion joins only with samples missing between its two sides (eq. 8.16), in order."""
     moves = np.array(obs.move_ranges, dtype=np.int64).reshape(-1, 2)
     found = joints(list(obs.whitened), obs.time_s, obs.recording.rate_hz, moves, clipped_samples(obs))
     owner = [int(np.flatnonzero((moves[:, 0] <= k) & (k < moves[:, 1]))[0]) for k in found.sample]
@@ -47,55 +46,22 @@ def find_losses(obs: Observations) -> list[Loss]:
     return sorted(losses, key=lambda loss: loss.sample)
 
 
-def _with_losses(obs: Observations, losses: dict[int, int]) -> Observations:
-    """Observations of the recording with samples inserted."""
-    made = observe(*insert_samples(obs.recording, obs.segments, losses), obs.averaging)
-    return replace(made if obs.support is None else made.on(*obs.support), jitter_s=obs.jitter_s)
-
-
-def _same_moves(obs: Observations, losses: dict[int, int]) -> Observations:
-    """The observations with samples inserted, of the same moves: others may have been left out of them before."""
-    if not losses:
-        return obs
-    whole, known = _with_losses(obs, losses), {(int(a), int(b)) for a, b in obs.move_poses}
-    other = {m for m, (a, b) in enumerate(whole.move_poses) if (int(a), int(b)) not in known}
-    whole = whole.without_moves(other)
-    return whole if whole.n_moves == obs.n_moves else obs
-
-
 def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     """Losses with their counts, and the standard error of each count by its sample.
 
     The joint of the two sides of a gap gives the place and an approximate count. Gravity and zero velocity after the
     move determine the exact count, or show that nothing is missing, because a loss changes the integrated rotation. The
-    session is fitted with those inserted that the motion alone decides, and without the moves that seem to have other
-    losses, half of all at the most, so that a loss cannot bias it.
+    session is fitted with those that the motion alone decides, as gaps of time, and without the moves that seem to have
+    other losses, half of all at the most, so that a loss cannot bias it.
     """
-    counted = _by_gravity(context, find_losses(context.obs))
-    # Two losses close together are one joint that fits neither: the second shows once the first is inserted.
-    more = _beside(context.obs, counted[0])
-    return _by_gravity(context, [*counted[0], *more]) if more else counted
-
-
-def _beside(obs: Observations, known: list[Loss]) -> list[Loss]:
-    """Losses that show once the ``known`` ones are inserted."""
-    counts = {one.sample: one.count for one in known}
-    whole = _same_moves(obs, counts)
-    if whole is obs:
-        return []
-    place = moved(obs.recording.n_samples, counts)
-    found = [
-        replace(one, sample=int(np.searchsorted(place, one.sample, side="right")) - 1) for one in find_losses(whole)
-    ]
-    return [one for one in found if one.sample not in counts]
-
-
-def _by_gravity(context: Context, losses: list[Loss]) -> tuple[list[Loss], dict[int, float]]:
-    obs = context.obs
+    obs, losses = context.obs, find_losses(context.obs)
+    if not losses:
+        return [], {}
     doubtful = [one for one in sorted(losses, key=lambda one: -one.gain) if not one.is_certain]
     touched = set(list(dict.fromkeys(one.move for one in doubtful))[: obs.n_moves // 2])
-    whole = _same_moves(obs, {one.sample: one.count for one in losses if one.is_certain})
-    clean = _of_moves_that_agree(whole.without_moves(touched), context.fitted.state, context.fitted.prior)
+    whole = with_gaps(obs, {one.sample: one.count for one in losses if one.is_certain})
+    # Moves with other losses are in the tails of the noise that fits the others.
+    clean = hypothesis(whole.without_moves(touched), context.fitted.state, context.fitted.prior).fitted.state
     misfit = (move_residuals(whole, clean) ** 2).sum(axis=1)
     usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / chdtri(ROWS, 0.5), 1.0)
     counted: list[Loss] = []
@@ -123,7 +89,8 @@ class _Move:
         return float((move_residuals(whole, self.state) ** 2).sum())
 
     def counted(self, losses: Sequence[Loss]) -> list[Loss]:
-        """Losses with the counts that gravity determines; those that do not reduce the misfit are left out.
+        """Losses with the counts that gravity determines; those that do not reduce the misfit, as a jolt that
+        looks like a loss, are left out.
 
         Refined together, since one without the other has a wrong count; then the weakest is tried first.
         """
@@ -167,18 +134,6 @@ class _Move:
         return float(max(0.3, np.sqrt(max(best / ROWS, 1.0) / max(float(np.mean(beside)), 1e-3))))
 
 
-def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | None) -> SessionState:
-    """The session without moves that contradict it: an undetected loss must not bias the reference of the others."""
-    for _ in range(obs.n_moves):
-        state = fit(obs, state, prior).state
-        misfit = (move_residuals(obs, state) ** 2).sum(axis=1)
-        bad = {int(m) for m in np.flatnonzero(misfit > CONTRADICTS * np.median(misfit))}
-        if not bad or obs.n_moves - len(bad) < FEWEST_MOVES:
-            return state
-        obs = obs.without_moves(bad)
-    return state
-
-
 class DroppedSamples(DirectEffect):
     """Both sensors skip the same whole number of samples at once; with these inserted the motion is smooth."""
 
@@ -188,8 +143,6 @@ class DroppedSamples(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)
-        # A jolt looks like a loss; gravity then gives a count of zero, or one that is not significant.
-        losses = [loss for loss in losses if loss.count > CLEAR * sigmas[loss.sample]]
         if not losses:
             return None
         obs = context.obs
@@ -223,6 +176,5 @@ class DroppedSamples(DirectEffect):
         p = float(np.exp(-0.5 * clearest)) * n_intervals * most_lost(obs.recording.rate_hz)
         return Evidence(
             p, gain, parameters, statement, "timing", where,
-            reweigh=lambda old: _with_losses(old, counts),
-            begins=frozenset(obs.move_poses[[loss.move for loss in losses], 0].tolist()),
+            reweigh=lambda old: with_gaps(old, counts),
         )  # fmt: skip

@@ -114,7 +114,6 @@ class Quantisation(DirectEffect):
     """An LSB so large against the noise that averaging does not resolve it."""
 
     id = "quantisation"
-    is_proof = True
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs

@@ -80,7 +80,6 @@ def clipped_samples(obs: Observations) -> BoolArray:
 
 class _Saturation(DirectEffect):
     sensor: ClassVar[int]
-    is_proof = True
 
     def find(self, context: Context) -> Evidence | None:
         obs, is_gyro = context.obs, self.sensor == GYRO
