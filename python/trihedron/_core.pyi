@@ -565,7 +565,6 @@ class SessionModel:
         noise: _Pair,
         prior: tuple[FloatArray, FloatArray, bool] | None,
         scatter: tuple[FloatArray, float] | None,
-        change: tuple[tuple[FloatArray, FloatArray] | None, tuple[FloatArray, FloatArray] | None] = ...,
     ) -> SessionModel: ...
     def fit(
         self,

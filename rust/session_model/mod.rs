@@ -119,9 +119,6 @@ impl StaticMeans {
     }
 }
 
-/// Change of a raw mean from the first to the second half of a pose, and the matrix that whitens it.
-pub type Change = (Vector3<f64>, Matrix3<f64>);
-
 /// Prior of the linear models.
 #[derive(Debug, Clone)]
 pub struct Prior {
@@ -146,8 +143,6 @@ pub struct Session {
     pub force: StaticMeans,
     /// Gyro in static poses.
     pub rate: Option<StaticMeans>,
-    /// Of either sensor in every pose; `None`: unused.
-    pub change: [Option<Vec<Change>>; 2],
     /// Moves between neighbouring poses.
     pub moves: Arc<Vec<Move>>,
     /// Noise of the moves' samples.
@@ -235,12 +230,6 @@ impl Session {
             )));
         }
         let sizes = [self.time_s.len(), self.force.sigma.len()];
-        let changes = self.change.iter().flatten();
-        if changes.into_iter().any(|change| change.len() != h) {
-            return Err(Error::bad_input(format!(
-                "{h} poses need as many changes between their halves"
-            )));
-        }
         let rate_sizes = self
             .rate
             .as_ref()

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::chain::{Layout, Rows};
+use super::chain::Layout;
 use super::rows::{Domain, Group, Kind};
 use super::{Distortion, N_MODEL, Session, State, StaticMeans, tangent_plane};
 use crate::error::{Error, Result};
@@ -62,51 +62,7 @@ impl Session {
             group.domain = Domain::StaticForce;
             out.push(group);
         }
-        self.rates_at_rest(state, distortion, layout, out)?;
-        self.changes_at_rest(state, distortion, layout, out)
-    }
-
-    /// (11.2b): the change of the raw mean between the halves of a pose less what the effects add to it.
-    fn changes_at_rest(
-        &self,
-        state: &State,
-        distortion: &Distortion,
-        layout: Layout,
-        out: &mut Vec<Group>,
-    ) -> Result<()> {
-        let sensors = [
-            (&distortion.force, &state.force_scale, Domain::ForceChange),
-            (&distortion.rate, &state.rate_scale, Domain::RateChange),
-        ];
-        for (change, (columns, scale, domain)) in self.change.iter().zip(sensors) {
-            let Some(change) = change else { continue };
-            let inverse = scale.try_inverse().ok_or_else(collapsed)?;
-            for (i, (read, weight)) in change.iter().enumerate() {
-                let point = self.n_points() + i;
-                let mut asked = Vector3::zeros();
-                add_effect(columns.as_ref(), distortion.k, point, state, &mut asked);
-                let residual = weight * (read - inverse * asked);
-                let mut own = DMatrix::zeros(3, distortion.k);
-                let side = columns.as_ref();
-                rest_columns(side, distortion.k, point, &inverse, weight, &mut own);
-                let mut border = DMatrix::zeros(3, layout.border);
-                border.columns_mut(N_MODEL, distortion.k).copy_from(&own);
-                out.push(Group {
-                    rows: Rows {
-                        residual: DVector::from_column_slice(residual.as_slice()),
-                        border,
-                        pose: None,
-                        here: DMatrix::zeros(3, 0),
-                        next: DMatrix::zeros(3, 0),
-                    },
-                    domain,
-                    kind: Kind::Reading,
-                    segment: i,
-                    log_weight: 0.0,
-                });
-            }
-        }
-        Ok(())
+        self.rates_at_rest(state, distortion, layout, out)
     }
 
     /// (11.2).
@@ -189,7 +145,7 @@ fn set(matrix: &mut DMatrix<f64>, column: usize, slope: &Vector3<f64>, weight: &
     }
 }
 
-/// The columns `(3, k)` at a point; none where an effect changes nothing inside poses.
+/// The columns `(3, k)` at a point.
 fn row_of(columns: Option<&Vec<f64>>, k: usize, point: usize) -> Option<&[f64]> {
     columns?.get(3 * k * point..3 * k * (point + 1))
 }

@@ -23,10 +23,6 @@ pub enum Domain {
     Dynamics = 3,
     /// Priors that keep undetermined directions finite.
     Prior = 4,
-    /// Change of the accelerometer between the halves of a pose.
-    ForceChange = 5,
-    /// Change of the gyro between the halves of a pose.
-    RateChange = 6,
 }
 
 /// Process to which a row belongs.
@@ -256,15 +252,6 @@ impl Session {
                             &weight,
                             &mut out,
                         );
-                    }
-                }
-                Domain::ForceChange | Domain::RateChange => {
-                    let s = usize::from(group.domain == Domain::RateChange);
-                    let side = [&distortion.force, &distortion.rate][s].as_ref();
-                    if let Some(change) = &self.change[s] {
-                        let point = self.n_points() + group.segment;
-                        let weight = &change[group.segment].1;
-                        rest_columns(side, k, point, [&force, &rate][s], weight, &mut out);
                     }
                 }
                 _ => {

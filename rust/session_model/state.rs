@@ -9,8 +9,7 @@ use crate::sensor_model::LOWER;
 /// Effects in the corrected readings, linear in their parameters.
 #[derive(Debug, Clone, Default)]
 pub struct Distortion {
-    /// `(points, 3, k)` row by row, SI; points are the poses, then the samples of every move, then, where the effect
-    /// changes inside poses, the change of the mean between the halves of every pose.
+    /// `(points, 3, k)` row by row, SI; points are the poses, then the samples of every move.
     pub force: Option<Vec<f64>>,
     /// The same of the rate.
     pub rate: Option<Vec<f64>>,

@@ -93,7 +93,6 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
         time_s: pose_time,
         force: at_rest(force_mean, noise_force),
         rate: Some(at_rest(zeros.clone(), noise_rate)),
-        change: [None, None],
         moves: std::sync::Arc::new(moves),
         noise: MoveNoise {
             force_density: noise_force,

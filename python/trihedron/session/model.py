@@ -19,8 +19,6 @@ LOWER = np.tril_indices(3)
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep undetermined directions finite and belong to no domain."""
 
-Change = tuple[FloatArray, FloatArray]
-"""Changes (h, 3) of the raw means between the halves of the poses, and the matrices (h, 3, 3) that whiten them."""
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
 """No further columns, as a hypothesis of the core."""
 
@@ -79,11 +77,6 @@ class SessionReadings(SessionNoise):
     def n_poses(self) -> int:
         return len(self.pose_force)
 
-    @property
-    def changes(self) -> tuple[Change | None, Change | None]:
-        """Of the accelerometer and of the gyro (eq. 11.2b); ``None`` where they are not used."""
-        return None, None
-
     def core_poses(self) -> _core.SessionPoses:
         """The poses as input of the core."""
         return _core.SessionPoses(
@@ -112,7 +105,6 @@ class SessionReadings(SessionNoise):
             gravity=(gravity_m_s2, self.earth_up_rad_s), poses=self.core_poses(), moves=moves, noise=timing_s,
             prior=None if prior is None else (prior.mean, prior.covariance, prior.is_weak),
             scatter=(unit, self.force_scatter / float(unit[0, 0])) if is_scatter_free else None,
-            change=self.changes,
         )  # fmt: skip
 
     def at_means(

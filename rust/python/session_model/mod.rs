@@ -7,7 +7,7 @@ mod read_out;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{SMatrix, Vector3};
 use numpy::{
     PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyUntypedArrayMethods, ToPyArray,
@@ -21,14 +21,12 @@ use crate::session_model::move_rows::Weights;
 use crate::session_model::moves::MoveNoise;
 use crate::session_model::strength_search::Within;
 use crate::session_model::strengths::tune;
-use crate::session_model::{Change, Distortion, N_MODEL, Prior, Session, Strengths};
+use crate::session_model::{Distortion, N_MODEL, Prior, Session, Strengths};
 use fit::SessionFit;
 use poses::{SessionMoves, SessionPoses, SessionState};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
-/// Changes `(h, 3)` of one sensor inside its poses, and `(h, 3, 3)` matrices that whiten them.
-type Changes<'py> = (Array2<'py>, Array3<'py>);
 /// A value for the accelerometer and one for the gyro.
 type Pair = (f64, f64);
 /// Corner times s, scatter, departure from the line between poses, excess of moves: accelerometer and gyro (gravity and
@@ -95,18 +93,6 @@ fn distortion(
     })
 }
 
-/// Changes of one sensor with the matrices that whiten them.
-fn changes_of(given: &Changes<'_>) -> PyResult<Vec<Change>> {
-    let (change, white) = (rows3("changes", &given.0)?, given.1.as_array());
-    if white.shape() != [change.len(), 3, 3] {
-        return Err(PyValueError::new_err(
-            "changes need as many (3, 3) matrices",
-        ));
-    }
-    let whitened = |(i, one)| (one, Matrix3::from_fn(|r, c| white[[i, r, c]]));
-    Ok(change.into_iter().enumerate().map(whitened).collect())
-}
-
 fn strengths_of(given: AllStrengths) -> Strengths {
     Strengths {
         corner_s: given.0.into(),
@@ -150,12 +136,11 @@ impl SessionModel {
     /// `scatter`: `(2, 3)` raw, the scatter of strength one, and the strength of the accelerometer's scatter that is
     /// expected from its noise inside poses, 0 where there is none.
     #[new]
-    /// `change`: of either sensor between the halves of every pose, `(h, 3)` raw, and `(h, 3, 3)` matrices that whiten it.
     #[expect(
         clippy::too_many_arguments,
         reason = "named, and a thin seam: each is one part of the session"
     )]
-    #[pyo3(signature = (*, gravity, poses, moves, noise, prior, scatter, change=(None, None)))]
+    #[pyo3(signature = (*, gravity, poses, moves, noise, prior, scatter))]
     fn new(
         py: Python<'_>,
         gravity: Pair,
@@ -164,7 +149,6 @@ impl SessionModel {
         noise: Pair,
         prior: Option<(PyReadonlyArray1<'_, f64>, Array2<'_>, bool)>,
         scatter: Option<(Array2<'_>, f64)>,
-        change: (Option<Changes<'_>>, Option<Changes<'_>>),
     ) -> PyResult<Self> {
         let prior = prior
             .map(|(mean, covariance, is_weak)| prior_of(&mean, &covariance, is_weak))
@@ -186,15 +170,12 @@ impl SessionModel {
             jitter_s,
             nominal_step_s,
         };
-        let [force_change, rate_change] =
-            [change.0, change.1].map(|one| one.as_ref().map(changes_of).transpose());
         let session = Session {
             gravity: gravity.0,
             earth_up: gravity.1,
             time_s: poses.time_s.clone(),
             force: poses.force.clone(),
             rate: poses.rate.clone(),
-            change: [force_change?, rate_change?],
             moves: Arc::clone(&moves.moves),
             noise,
             prior,

@@ -19,9 +19,8 @@ from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
 from trihedron.session.model import STATIC_ACCEL
+from trihedron.session.noise import half_changes
 
-MOST = 0.25
-"""Share of vibrating poses above which the place vibrates and no single pose is called disturbed."""
 BUMP_SIGMA = 7.0
 """Deviation of a 0.1 s mean from the line through its surroundings, in sigma: drift inside a pose stays below it."""
 FEWEST_BLOCKS = 4
@@ -93,10 +92,10 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_poses)
     dof = np.maximum(np.bincount(poses, free, minlength=obs.n_poses), LEAST_DOF)
     out: npt.NDArray[np.bool_] = chi2 > SURE**2 * dof
-    for change, sigma in zip(obs.half_changes, (obs.pose_force_sigma, obs.pose_rate_sigma), strict=True):
-        if change is not None and sigma is not None:
+    for raw, sigma in ((obs.raw_force, obs.pose_force_sigma), (obs.raw_rate, obs.pose_rate_sigma)):
+        if raw is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
-            out |= (np.abs(change) > 2.0 * SURE * sigma).any(axis=1)
+            out |= (np.abs(half_changes(raw, obs.segments.spans)) > 2.0 * SURE * sigma).any(axis=1)
     before, after = obs.move_poses[fitted.core.tails < OUTLYING].T
     out[np.intersect1d(before, after)] = True
     return out
@@ -119,8 +118,6 @@ class DisturbedPose(DirectEffect):
         disturbed = list(bumps)
         held = (max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before),) if disturbed else ()
         restless, predicted = _restless(obs)
-        if len(restless) > MOST * obs.n_poses:
-            restless = []
         if restless and predicted is not None:
             held = (*held, predicted)
         if not disturbed and not restless:

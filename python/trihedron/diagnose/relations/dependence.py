@@ -17,19 +17,18 @@ Column = tuple[str, FloatArray, str]
 class Dependence(Effect):
     """Dependence of a sensor on variables, without a mechanism: an effect that is in no catalogue.
 
-    ``names`` and ``units`` (k,) as reported, ``values`` (points, k). ``family`` selects the text of the experiment;
-    ``is_motion`` marks variables that are zero in static poses. ``axes`` are the sets of sensor axes that may depend on
-    them: parameters run over the axes, and for each over the names.
+    ``courses`` are sets of variables that compete. ``family`` selects the text of the experiment; ``is_motion`` marks
+    what is zero in static poses. ``parts`` are the sets of columns of :meth:`base` that may depend on them: parameters
+    run over the columns, and for each over the variables.
     """
 
     def __init__(
-        self, sensor: int, family: str, columns: Sequence[Column], *, is_motion: bool = False,
-        axes: Sequence[tuple[int, ...]] = ((0,), (1,), (2,), ALL_AXES),
+        self, sensor: int, family: str, *courses: Sequence[Column], is_motion: bool = False,
+        parts: Sequence[tuple[int, ...]] = ((0,), (1,), (2,), ALL_AXES),
     ) -> None:  # fmt: skip
-        self.sensor, self.family, self.is_motion, self.axes = sensor, family, is_motion, axes
-        self.names, self.units = tuple(name for name, *_ in columns), tuple(unit for *_, unit in columns)
-        self.values = np.stack([values for _, values, _ in columns], axis=1)
-        self.id = f"{('accelerometer', 'gyroscope')[sensor]}: {', '.join(self.names)}"
+        self.sensor, self.family, self.is_motion, self.parts, self.courses = sensor, family, is_motion, parts, courses
+        self.names = tuple(name for course in courses for name, *_ in course)
+        self.id = f"{('accelerometer', 'gyroscope')[sensor]} {family}: {', '.join(self.names)}"
 
     @property
     def domain(self) -> Domain:
@@ -38,14 +37,23 @@ class Dependence(Effect):
             return "moves" if self.sensor else "dynamics"
         return "static-gyro" if self.sensor else "static-accel"
 
+    def base(self, context: Context) -> tuple[FloatArray, Sequence[str]]:
+        """Columns (points or 1, 3, m) that are multiplied by the variables, and their names: one along each axis."""
+        return (context.gyro_axes if self.sensor else context.accel_axes)[None], [f"{axis}:" for axis in AXES]
+
     def variants(self, context: Context) -> list[Variant]:
-        values = self.values if self.is_motion else self.values - self.values[: context.obs.n_poses].mean(axis=0)
-        k, own = len(self.names), context.gyro_axes if self.sensor else context.accel_axes
-        whole = acting_on(self.sensor, np.einsum("ia,nk->niak", own, values).reshape(len(values), 3, -1))
+        base, along = self.base(context)
         out = []
-        for axes in self.axes:
-            part = tuple(a * k + j for a in axes for j in range(k))
-            names = tuple(f"{AXES[a]}: {name}" for a in axes for name in self.names)
-            units, label = self.units * len(axes), "".join(AXES[a] for a in axes)
-            out.append(Variant(whole.of(part), names, units, label=label, part_of=(whole, part)))
+        for course in self.courses:
+            said, columns, units = zip(*course, strict=True)
+            values, k = np.stack(columns, axis=1), len(course)
+            if not self.is_motion:
+                values = values - values[: context.obs.n_poses].mean(axis=0)
+            products = np.einsum("nip,nj->nipj", np.broadcast_to(base, (len(values), *base.shape[1:])), values)
+            whole = acting_on(self.sensor, products.reshape(len(values), 3, -1))
+            for of in self.parts:
+                part = tuple(p * k + j for p in of for j in range(k))
+                names = tuple(f"{along[p]} {name}" for p in of for name in said)
+                label = ", ".join(names)
+                out.append(Variant(whole.of(part), names, units * len(of), label=label, part_of=(whole, part)))
         return out

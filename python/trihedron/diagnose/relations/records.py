@@ -7,7 +7,6 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray, sigmas_of
 from trihedron.diagnose.effects.contract import SENSORS
 from trihedron.diagnose.hypothesis import held_out_records
-from trihedron.diagnose.relations.rotations import NOT_TURNED
 from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import WORLD_VECTOR
 from trihedron.diagnose.residuals.noise_level import noise_changes
@@ -71,9 +70,6 @@ def _of_variables(one: Follows, value: FloatArray, covariance: FloatArray, share
     axes: list[str] = []
     for name, size, error, unit in zip(variant.names, value, sigma, variant.units, strict=True):
         axis, _, variable = name.rpartition(": ")
-        # The column of poses without a known previous rotation is no coefficient of the relation.
-        if variable == NOT_TURNED:
-            continue
         per = out if unit == "1" else f"({out})/({unit})"
         coefficients.append(EffectParameter(name, float(size), float(error), per))
         names.append(variable)

@@ -9,10 +9,9 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, acting_on
 from trihedron.diagnose.relations.dependence import Column, Dependence
-from trihedron.session.noise import half_changes
 
-HISTORY, NOT_TURNED = "last rotation", "before any rotation"
-"""Family of the last rotation; poses without a known one (the first, or one after a gap) have their own column."""
+HISTORY = "last rotation"
+"""Family of the last rotation."""
 TIME_CONSTANTS_S = (1.0, 2.5, 6.0, 15.0)
 """Faster decays are over before a pose is static; slower ones retain the rotation for all of it."""
 
@@ -20,12 +19,11 @@ TIME_CONSTANTS_S = (1.0, 2.5, 6.0, 15.0)
 class Decaying(Dependence):
     """Dependence of every axis on its own rotations, which are forgotten exponentially: ``y' = ω − y / τ``; or on their
     size, ``y' = |ω| − y / τ``.
-
-    The columns are those of the points, then the change between the halves of every pose (eq. 11.2b).
     """
 
     def __init__(self, sensor: int, names: Sequence[str]) -> None:
-        super().__init__(sensor, "decaying rotation", [(name, np.zeros(0), "rad") for name in names])
+        super().__init__(sensor, "decaying rotation")
+        self.names, self.id = tuple(names), f"{self.id}{', '.join(names)}"
 
     def variants(self, context: Context) -> list[Variant]:
         return [self._at(context, tau_s) for tau_s in TIME_CONSTANTS_S]
@@ -37,7 +35,7 @@ class Decaying(Dependence):
         rate = context.axis_rate
         size = np.broadcast_to(np.linalg.norm(rate, axis=1)[:, None], rate.shape)
         values = forgotten(context, rate if len(self.names) > 1 else size, tau_s)
-        values[: context.n_points] -= values[: context.obs.n_poses].mean(axis=0)
+        values -= values[: context.obs.n_poses].mean(axis=0)
         columns = context.on_axes(self.sensor, values)
         names = tuple(f"{axis}: {self.names[k % len(self.names)]}" for k, axis in enumerate(AXES))
         shape = {"time_constant": (tau_s, "s")}
@@ -51,24 +49,24 @@ def decaying(sensor: int) -> list[Dependence]:
 
 
 def forgotten(context: Context, rate: FloatArray, tau_s: float) -> FloatArray:
-    """(points + poses, 3) ``y' = rate − y / τ`` of a rate (points, 3): means over the poses, samples of the moves, then
-    the mean over the second half of every pose less that over the first."""
+    """(points, 3) ``y' = rate − y / τ`` of a rate (points, 3): means over the poses, samples of the moves."""
     obs = context.obs
     whole = np.zeros((len(obs.time_s), 3))
     whole[context.point_samples[obs.n_poses :]] = rate[obs.n_poses :]
     # What is remembered of a rotation is a low-pass of its rate, times its time constant.
     slow = tau_s * _core.simulate_first_order(whole, 1.0 / obs.recording.rate_hz, (tau_s,) * 3)
-    return np.concatenate([context.at_points(slow), half_changes(slow, obs.segments.spans)])
+    return context.at_points(slow)
 
 
 def retained(context: Context) -> list[Column]:
-    """The rotation before a pose, about the gyro axes: the sign of a small one is used too."""
-    turn = np.zeros_like(context.fitted.state.up)
-    unknown = np.ones(len(turn))
+    """The rotation before a pose, about the gyro axes: the sign of a small one is used too. Poses without a known one
+    (the first, or one after a gap) have the mean of the others."""
+    turn = np.full_like(context.fitted.state.up, np.nan)
     for where, (_, after) in zip(context.moves, context.obs.move_poses, strict=True):
         turn[after] = np.trapezoid(context.axis_rate[where], context.time_s[where], axis=0)
-        unknown[after] = 0.0
     columns = [(f"last rotation about {AXES[a]}", turn[:, a], "rad") for a in range(3)]
     columns += [(f"sign of the last rotation about {AXES[a]}", np.sign(turn[:, a]), "1") for a in range(3)]
-    columns += [("size of the last rotation", np.linalg.norm(turn, axis=1), "rad"), (NOT_TURNED, unknown, "1")]
-    return [(name, context.between_poses(value), unit) for name, value, unit in columns]
+    columns.append(("size of the last rotation", np.linalg.norm(turn, axis=1), "rad"))
+    known = np.isfinite(turn).all(axis=1)
+    each = ((name, np.where(known, value, value[known].mean()), unit) for name, value, unit in columns)
+    return [(name, context.between_poses(value), unit) for name, value, unit in each] if known.any() else []

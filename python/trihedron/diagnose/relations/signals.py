@@ -15,7 +15,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.relations.dependence import ALL_AXES, Column, Dependence
-from trihedron.diagnose.relations.rotations import HISTORY, NOT_TURNED, decaying, retained
+from trihedron.diagnose.relations.rotations import HISTORY, decaying, retained
 from trihedron.diagnose.relations.scales import scales_in_time
 
 WORLD_VECTOR = "vector fixed in the world frame"
@@ -31,7 +31,7 @@ class WorldVector(Dependence):
     would be a g-sensitivity. Columns along the axes of the level frame for each axis of the body, vertical last."""
 
     def __init__(self, columns: Sequence[Column], dips_deg: tuple[float, ...]) -> None:
-        super().__init__(1, "world", columns, axes=(ALL_AXES,))
+        super().__init__(1, "world", columns, parts=(ALL_AXES,))
         self.dips_deg, self.id = dips_deg, f"{self.id}, dip {dips_deg}"
 
     def variants(self, context: Context) -> list[Variant]:
@@ -72,18 +72,18 @@ def dependences(context: Context) -> list[Dependence]:
             *_each(1, "rate products", _products("w", w, "(rad/s)^2"), is_motion=True),
             *_each(1, "rate", size, is_motion=True), *_world_vector(context),
         ]  # fmt: skip
-    # Those that vary, or compute their columns themselves.
-    return [one for one in out if not one.values.size
-            or (np.isfinite(one.values).all() and (np.ptp(one.values, axis=0) > 0.0).all())]  # fmt: skip
+
+    def varies(one: Dependence) -> bool:
+        return all(np.isfinite(v).all() and np.ptp(v) > 0.0 for course in one.courses for _, v, _ in course)
+
+    return [one for one in out if varies(one)]
 
 
 def _each(sensor: int, family: str, columns: Sequence[Column], *, is_motion: bool = False) -> list[Dependence]:
-    always = [one for one in columns if one[0] == NOT_TURNED and np.ptp(one[1]) > 0.0]
-    alone = [one for one in columns if one[0] != NOT_TURNED]
-    out = [Dependence(sensor, family, [one, *always], is_motion=is_motion) for one in alone]
-    three = range(0, len(alone) - 2, 3) if family in ANY_BY_ANY else ()
-    vectors = [[*alone[k : k + 3], *always] for k in three]
-    return out + [Dependence(sensor, family, one, is_motion=is_motion, axes=(ALL_AXES,)) for one in vectors]
+    three = range(0, len(columns) - 2, 3) if family in ANY_BY_ANY else ()
+    out = [Dependence(sensor, family, [one], is_motion=is_motion) for one in columns]
+    vectors = [columns[k : k + 3] for k in three]
+    return out + [Dependence(sensor, family, one, is_motion=is_motion, parts=(ALL_AXES,)) for one in vectors]
 
 
 def _products(symbol: str, values: FloatArray, unit: str) -> list[Column]:

@@ -29,7 +29,7 @@ def telegraphs(context: Context) -> Iterator[tuple[Dependence, float]]:
                 state, gain = levels
                 column = "a random telegraph signal", context.between_poses(state), "1"
                 score = 2.0 * (gain - float(np.log(3 * n_sensors)))
-                yield Dependence(sensor, TELEGRAPH, [column], axes=((axis,),)), score
+                yield Dependence(sensor, TELEGRAPH, [column], parts=((axis,),)), score
 
 
 def _levels(context: Context, sensor: int, axis: int) -> tuple[FloatArray, float] | None:

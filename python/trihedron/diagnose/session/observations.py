@@ -13,11 +13,10 @@ from trihedron import _core
 from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
-from trihedron.probability import CLEAR, MEDIAN_CHI2
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
-from trihedron.session.model import Change, Prior, SessionReadings, SessionState
-from trihedron.session.noise import along_gradient, half_changes, measure_noise
+from trihedron.session.model import Prior, SessionReadings, SessionState
+from trihedron.session.noise import along_gradient, measure_noise
 from trihedron.session.rounding import (
     UNIFORM,
     biases_by_codes,
@@ -48,7 +47,6 @@ class Observations(SessionReadings):
     ``unresolved`` (m, 4, 3) is the variance of the moves' integrals, (raw unit · s)²: of force and rate by motion
     faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
     ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
-    ``half_changes`` (poses, 3): raw mean over the second half of every pose less that over the first, of either sensor.
     ``averaging`` is the smoothing of the samples by the sensors' filters (eq. 11.6d).
     ``undithered`` (3,) are gyro axes whose noise does not dither the LSB; ``rounding`` (n, 3, k) the derivatives of raw
     rates in moves by k errors of rounding with prior σ ``rounding_sigma`` (k,): place of each of these axes' biases
@@ -61,7 +59,6 @@ class Observations(SessionReadings):
     time_s: FloatArray
     raw_force: FloatArray
     raw_rate: FloatArray | None
-    half_changes: tuple[FloatArray, FloatArray | None]
     move_ranges: tuple[tuple[int, int], ...]
     move_poses: npt.NDArray[np.intp]
     jitter_s: float = 0.0
@@ -155,24 +152,6 @@ class Observations(SessionReadings):
         return np.concatenate([at_rest, *(self.rounding[a:b] for a, b in self.move_ranges)])
 
     @cached_property
-    def changes(self) -> tuple[Change | None, Change | None]:
-        """Of an accelerometer along the vertical: a support that yields rotates gravity across it; of a gyro none where
-        the support yields."""
-        up, (of_force, of_rate) = self.force_up, self.half_changes
-        spread = 2.0 / np.sqrt(np.maximum(self.segments.duration_s, TINY))[:, None]
-        accel: Change | None = None
-        gyro: Change | None = None
-        if up is not None:
-            along = np.nan_to_num(up[0])
-            change = (np.nan_to_num(of_force) * along).sum(axis=1)[:, None]
-            white = _whitening(change, spread * np.sqrt(along**2 @ self.force_density**2)[:, None])
-            accel = change * along, white[:, :, None] * along[:, :, None] * along[:, None, :]
-        if of_rate is not None and self.rate_density is not None and self.support is None:
-            change = np.nan_to_num(of_rate)
-            gyro = change, _whitening(change, spread * self.rate_density)[:, :, None] * np.eye(3)
-        return accel, gyro
-
-    @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
         force, rate = (
@@ -190,17 +169,6 @@ class Observations(SessionReadings):
             unresolved=np.ascontiguousarray(self.unresolved),
             leans=np.zeros((self.n_poses, 2, 3)) if self.support is None else self.support[0].leans,
         )
-
-
-def _whitening(change: FloatArray, white: FloatArray) -> FloatArray:
-    """(poses, k) inverse errors of the changes inside the poses, 0 of a missing one: white noise, times what the poses
-    show where that is more, so that they have no more weight than their number; a pose beyond it was disturbed."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        z = np.nan_to_num(np.abs(change / white), posinf=0.0)
-    usual = np.maximum(np.median(z, axis=0) / np.sqrt(MEDIAN_CHI2[1]), 1.0)
-    shown = np.sqrt((np.minimum(z, CLEAR * usual) ** 2).mean(axis=0))
-    error = white * np.maximum(np.maximum(shown, 1.0), z / CLEAR)
-    return np.where(z > 0.0, 1.0 / np.maximum(error, TINY), 0.0)
 
 
 def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
@@ -246,10 +214,6 @@ def observe(recording: Recording, segments: Segments, averaging: float = 0.0) ->
     obs = Observations(
         recording=recording, segments=segments, whole=whole, time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin, raw_rate=raw_rate, force_origin=force_origin,
-        half_changes=(
-            half_changes(recording.accelerometer, spans),
-            None if raw_rate is None else half_changes(raw_rate, spans),
-        ),
         rate_origin=rate_origin, pose_force=segments.accelerometer_mean - force_origin, pose_rate=pose_rate,
         **vars(noise),
         pose_time_s=0.5 * (t[spans[:, 0]] + t[spans[:, 1] - 1]),

@@ -36,8 +36,7 @@ FOLDS = 8
 class Distortion:
     """What effects add to the corrected readings, linear in their parameters: SI, body frame.
 
-    ``force`` and ``rate`` (points, 3, K) or None, at the points of a session (poses, then move samples). Where
-    they change inside poses, (poses, 3, K) more: the mean over the second half of each less that over the first.
+    ``force`` and ``rate`` (points, 3, K) or None, at the points of a session (poses, then move samples).
     """
 
     force: FloatArray | None
@@ -69,12 +68,9 @@ def stacked(parts: list[Distortion]) -> Distortion:
         given = [getattr(p, name) for p in parts]
         if all(g is None for g in given):
             return None
-        n, first = max(len(g) for g in given if g is not None), np.cumsum([0, *(p.n_parameters for p in parts)])
-        out = np.zeros((n, 3, int(first[-1])))
-        for g, a, b in zip(given, first[:-1], first[1:], strict=True):
-            if g is not None:
-                out[: len(g), :, a:b] = g
-        return out
+        n = next(len(g) for g in given if g is not None)
+        sides = zip(given, parts, strict=True)
+        return np.concatenate([np.zeros((n, 3, p.n_parameters)) if g is None else g for g, p in sides], axis=2)
 
     return Distortion(side("force"), side("rate"))
 
