@@ -196,8 +196,6 @@ SHAPE_STEPS = 0.6 * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Steps of the logarithm of a shape parameter about the grid's best, to which a parabola is fitted."""
 N_RESHAPED = 2
 """Iterations of size and shape: the second changes them by a tenth of what the first does."""
-SAME_COLUMNS = 3e-3
-"""Relative change of columns below which they are not computed again: sizes are known to some per cent."""
 STEP_LOG = 0.02
 """Half-step of the numerical derivative by the logarithm of a shape parameter."""
 
@@ -243,25 +241,19 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
 def renewed(model: Hypothesis) -> Hypothesis:
     """The hypothesis with the columns of its own motion, for effects of the true motion: those of the search were
     computed from readings that contained the effect, and with the S that was fitted without it."""
-    for _ in range(N_RESHAPED):
-        terms = [_renewed(model, term) for term in model.terms]
-        if all(new is old for new, old in zip(terms, model.terms, strict=True)):
-            break
-        model = again(model, terms)
+    if any(term.effect.is_of_true_motion for term in model.terms):
+        for _ in range(N_RESHAPED):
+            model = again(model, [_renewed(model, term) for term in model.terms])
     return model
 
 
 def _renewed(model: Hypothesis, term: Term) -> Term:
-    """A term with its columns computed from the motion of a hypothesis; the same one where they hardly change."""
+    """A term with its columns computed from the motion of a hypothesis."""
     known = term.variant
     if not term.effect.is_of_true_motion:
         return term
-    for made in term.effect.variants(model.context):
-        if (made.label, made.names, made.scale) == (known.label, known.names, known.scale):
-            pairs = zip(vars(made.distortion).values(), vars(known.distortion).values(), strict=True)
-            change = max(float(np.linalg.norm(a - b) / np.linalg.norm(a)) for a, b in pairs if a is not None)
-            return replace(term, variant=made) if change > SAME_COLUMNS else term
-    return term
+    same = (one for one in term.effect.variants(model.context) if (one.label, one.names) == (known.label, known.names))
+    return replace(term, variant=next(same))
 
 
 def with_shapes(model: Hypothesis) -> Hypothesis:

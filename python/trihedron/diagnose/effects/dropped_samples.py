@@ -20,8 +20,6 @@ from trihedron.session.model import SessionState
 
 ROWS = 5
 """Rows of a move: gravity after it, velocity over it."""
-MOST_OF_INTERVALS = 0.02
-"""Share of intervals with losses above which they are not single losses: the clock or the motion is different."""
 
 
 @dataclass(frozen=True)
@@ -147,8 +145,6 @@ class DroppedSamples(DirectEffect):
             return None
         obs = context.obs
         n_intervals = sum(b - a for a, b in obs.move_ranges)
-        if len(losses) > MOST_OF_INTERVALS * n_intervals:
-            return None  # losses everywhere are another effect
         counts = {loss.sample: loss.count for loss in losses}
         t = obs.time_s
         total = float(np.sqrt(sum(sigmas[loss.sample] ** 2 for loss in losses)))

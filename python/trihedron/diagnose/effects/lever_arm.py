@@ -12,9 +12,6 @@ from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not
 
-MIN_SHARE = 0.1
-"""Least share of the motion in other moves that one arm must predict. The travel of a hand does not follow the
-rotation: without an arm it leaves at most 5 % (21 simulated sessions)."""
 FEWEST_MOVES = 6
 """Twice the three unknowns of the arm: its uncertainty comes from the scatter between moves."""
 P_LIMIT = 1e-5
@@ -47,7 +44,7 @@ class LeverArm(DirectEffect):
             return None
         arm, covariance, p_value, (before, after), n_moves = found
         share = 1.0 - after / before
-        if share < MIN_SHARE or p_value > P_LIMIT:
+        if p_value > P_LIMIT:
             return None
         noise = float((context.noise_floor[0] ** 2).mean())
         rms = math.sqrt(before), math.sqrt(after)

@@ -21,8 +21,6 @@ TIMES_S = (0.004, 0.016, 0.064)
 """Times tried, s, each four times the one before; of those between, the columns are computed for the size found."""
 NEAR_ONE = (0.6, 1.6)
 """Range of a confirmed parameter: outside it another time of the grid fits better, or the mechanism does not."""
-LEAST_STEPS = 0.25
-"""In sample intervals: a shorter time constant decays by e⁻⁴ within a sample, and its column is that of a delay."""
 SMOOTHING_SIGMA = (0.6, 1.0)
 """Prior σ of the variance of a filter's response over the square of its lag, which is between 0 and 1, and of one that
 both sensors have beyond that of the session."""
@@ -67,12 +65,9 @@ class SensorLag(_Late):
             late = -context.derivative(context.axis_motion(sensor))
             label = f"{side.label}, {SEPARATE}"
             out.append(on_axes(context, sensor, (f"{side.label}_lag", late, "s"), label=label))
-        # A shorter time than the sampling resolves is that of a delay.
-        least_s = LEAST_STEPS / context.obs.recording.rate_hz
-        times = [t for t in TIMES_S if t >= least_s] or [TIMES_S[-1]]
         every = [
             _low_pass(context, sensor, t, f"{side.label}, {1e3 * t:.0f} ms")
-            for t in times
+            for t in TIMES_S
             for sensor, side in enumerate(SENSORS)
         ]
         return [*out, *every, *(_unsmoothed(one) for one in every)]

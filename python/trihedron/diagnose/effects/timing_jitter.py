@@ -11,11 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.diagnose.session.observations import Observations
-from trihedron.probability import SURE
 from trihedron.records.diagnosis import EffectParameter
-
-ORDINARY = 0.01
-"""Jitter, in sample intervals, below which the motion may cause it: where its acceleration jumps, no order is free."""
 
 
 @lru_cache(maxsize=8)
@@ -40,8 +36,6 @@ class TimingJitter(DirectEffect):
         if value <= 0.0:
             return None
         z, jitter = value / spread, float(np.sqrt(value))
-        if z < SURE or jitter < ORDINARY / context.obs.recording.rate_hz:
-            return None
         return Evidence(
             float(ndtr(-z)), float(z**2),
             (EffectParameter("jitter", jitter, float(0.5 * spread / value * jitter), "s"),),
