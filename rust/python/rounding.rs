@@ -5,17 +5,20 @@
     reason = "the methods are of one lifetime"
 )]
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    ToPyArray,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat3, rows};
+use super::ranges::ranges_within;
 use crate::rounding::Coarse;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rounding_variance, module)?)?;
-    module.add_function(wrap_pyfunction!(resting_axes, module)?)?;
-    module.add_function(wrap_pyfunction!(shared_errors, module)?)
+    module.add_function(wrap_pyfunction!(rounding_in_moves, module)?)
 }
 
 /// LSB, reading of the bias, and whether noise does not dither, of three axes each.
@@ -23,6 +26,13 @@ type Adc<'py> = (
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, bool>,
+);
+
+/// As [`rounding::InMoves`](crate::rounding::InMoves).
+type InMoves<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<bool>>,
+    Vec<(usize, Bound<'py, PyArray1<f64>>)>,
 );
 
 /// A kernel's answer about `readings` `(n, 3)` of an `adc`; `steady` as [`Coarse`] has them.
@@ -58,27 +68,24 @@ fn rounding_variance<'py>(
     rows(py, out.as_flattened(), 3)
 }
 
-/// Whether an axis rests in the LSB of its bias, `(n, 3)`.
+/// Rounding in the moves `edges` `(m, 2)`: variance `(n, 3)` of readings, whether an axis is in the LSB of its bias
+/// `(n, 3)`, and errors `(n,)` of one standard deviation each that all moves share, with the axis of each.
 #[pyfunction]
-fn resting_axes<'py>(
+fn rounding_in_moves<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray2<'py, f64>,
     adc: Adc<'py>,
+    edges: PyReadonlyArray2<'py, i64>,
     steady: (f64, usize),
-) -> PyResult<Bound<'py, PyArray2<bool>>> {
-    let out = asked(py, &readings, &adc, steady, |one| one.resting())?;
-    out.as_flattened().to_pyarray(py).reshape([out.len(), 3])
-}
-
-/// Axes, and errors `(n,)` of one standard deviation each along them, that all moves share.
-#[pyfunction]
-fn shared_errors<'py>(
-    py: Python<'py>,
-    readings: PyReadonlyArray2<'py, f64>,
-    adc: Adc<'py>,
-    steady: (f64, usize),
-) -> PyResult<Vec<(usize, Bound<'py, PyArray1<f64>>)>> {
-    let out = asked(py, &readings, &adc, steady, |one| one.shared())?;
+) -> PyResult<InMoves<'py>> {
+    let edges = ranges_within(&edges, readings.shape()[0])?;
+    let of_moves = |one: &Coarse<'_>| one.in_moves(&edges);
+    let (variance, is_static, shared) = asked(py, &readings, &adc, steady, of_moves)?;
     let array = |(axis, error): (usize, Vec<f64>)| (axis, error.to_pyarray(py));
-    Ok(out.into_iter().map(array).collect())
+    let is_static = is_static.as_flattened().to_pyarray(py);
+    Ok((
+        rows(py, variance.as_flattened(), 3)?,
+        is_static.reshape([variance.len(), 3])?,
+        shared.into_iter().map(array).collect(),
+    ))
 }

@@ -1,5 +1,7 @@
 //! Rate hidden inside one LSB of a coarse ADC, in poses and in moves (docs/model-session.md).
 
+mod static_ends;
+
 use std::cmp::Ordering;
 
 use crate::running::running_median;
@@ -14,6 +16,10 @@ const SETTLING: [(f64, f64); 2] = [(0.50, 2.5), (0.68, 1.25)];
 /// `(2h/3 - 1/2)²` of a step for a turn at height `h` in it, averaged over `h` with the number of readings, which grows
 /// as `√h`.
 const TURNED: f64 = 1.0 / 3.0;
+
+/// Errors of rounding in moves: variance of every reading, whether an axis is in the LSB of its bias there, and errors
+/// that all moves share, with the axis that has each.
+pub type InMoves = (Vec<[f64; 3]>, Vec<[bool; 3]>, Vec<(usize, Vec<f64>)>);
 
 /// Readings of an ADC whose noise does not dither its LSB on some axes.
 #[derive(Debug, Clone, Copy)]
@@ -67,10 +73,28 @@ impl Coarse<'_> {
         out
     }
 
+    /// Rounding in the moves `edges` (half-open).
+    #[must_use]
+    pub fn in_moves(&self, edges: &[[usize; 2]]) -> InMoves {
+        let (mut variance, mut is_static) = (self.variance(), self.resting());
+        self.add_static_ends(edges, &mut is_static);
+        for &[first, last] in edges {
+            for axis in self.listed() {
+                // An axis that is static throughout may rotate at any rate inside its LSB: one error of all readings.
+                if is_static[first..last].iter().all(|row| row[axis]) {
+                    let whole = (last - first) as f64 * UNIFORM * self.quantum[axis].powi(2);
+                    for row in &mut variance[first..last] {
+                        row[axis] = row[axis].max(whole);
+                    }
+                }
+            }
+        }
+        (variance, is_static, self.shared())
+    }
+
     /// Whether an axis rests: it is in the LSB of its bias for longer than it takes to leave it, while others rotate, or
     /// while the body stops inside a move.
-    #[must_use]
-    pub fn resting(&self) -> Vec<[bool; 3]> {
+    fn resting(&self) -> Vec<[bool; 3]> {
         let mut out = vec![[false; 3]; self.readings.len()];
         for axis in self.listed() {
             for one in self.rests(axis) {
@@ -86,8 +110,7 @@ impl Coarse<'_> {
     /// Errors of one standard deviation that all moves share, with the axis that has each: its rotation inside the LSB of
     /// its bias while another axis leads. It is due to their misalignment and changes sign with the rotation: it does not
     /// scatter from move to move.
-    #[must_use]
-    pub fn shared(&self) -> Vec<(usize, Vec<f64>)> {
+    fn shared(&self) -> Vec<(usize, Vec<f64>)> {
         let mut out = Vec::new();
         for axis in self.listed() {
             let size = self.quantum[axis] * UNIFORM.sqrt();
@@ -254,16 +277,21 @@ impl Coarse<'_> {
 /// Samples with rounding variance next to the LSB of the bias, from the durations of the two steps beside it.
 fn hidden(first_step: usize, second_step: usize) -> usize {
     let ratio = second_step as f64 / first_step.max(1) as f64;
-    let [(x0, y0), (x1, y1)] = SETTLING;
-    let share = ((ratio - x0) / (x1 - x0)).clamp(0.0, 1.0);
-    let samples = first_step as f64 * (y0 + share * (y1 - y0));
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a number of samples"
-    )]
-    let whole = samples.ceil() as usize;
-    whole
+    samples((first_step as f64 * between(SETTLING[0], SETTLING[1], ratio)).ceil())
+}
+
+/// Value at `x` on the line between two points, that of the nearer one beyond them.
+fn between((x0, y0): (f64, f64), (x1, y1): (f64, f64), x: f64) -> f64 {
+    y0 + ((x - x0) / (x1 - x0)).clamp(0.0, 1.0) * (y1 - y0)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a number of samples"
+)]
+fn samples(whole: f64) -> usize {
+    whole as usize
 }
 
 /// Half-open ranges in which a flag is set.

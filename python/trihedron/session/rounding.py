@@ -19,13 +19,6 @@ dither the ADC: the mean of rounded readings is wrong by up to half an LSB, howe
 CHATTER = 9
 """Length of the running median, in readings, that removes toggling between neighbouring codes."""
 STEADY = IN_STEP, CHATTER
-HIDDEN = (0.465, 0.567, 0.689, 1.0), (1.156, 0.957, 0.782, 0.500)
-"""Table for a rate that settles as exp(-t/τ), then for rates that start as t⁴, t² and t: ratio of the time for the
-second LSB to that for the first; time before the first code change in which the bias's position inside the LSB acts
-as a rate, in times of the first LSB. With rate r reached at t(r), codes give Σ t'(k - ½) of the time in which it acts
-(first order, mean of both directions): τ(2 ln 2 + γ + ln k), √k + ζ(½, ½)/2 of √k; before it the axis is static."""
-STEPS = IN_STEP, 1.0 + IN_STEP, 2.0 + IN_STEP
-"""Limits, in LSB from the static reading, of the static code, of the next code and of the one after it."""
 LEAST_WHITE = 1e-2
 """Least white noise of an undithered axis, as a share of the rounding variance: its readings show none."""
 
@@ -57,22 +50,6 @@ def rounding_of_moves(
     nowhere = np.full(3, np.nan)
     found = [rounding_variance(readings[a:b], quantum, nowhere, axes) for a, b in ranges]
     return np.array([np.zeros(3) if of_move is None else of_move.sum(axis=0) for of_move in found]).reshape(-1, 3)
-
-
-def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> BoolArray:
-    """(n, 3) whether an axis of ``axes`` (3,) rests: it is in the LSB of its bias for longer than it takes to leave it,
-    while others rotate, or while the body stops inside a move."""
-    return _core.resting_axes(readings, (quantum, rest, axes), STEADY)
-
-
-def shared_errors(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> FloatArray:
-    """Errors (n, 3, k) of one standard deviation each that all moves share: the rotation of an axis inside the LSB of
-    its bias while another one leads."""
-    found = _core.shared_errors(readings, (quantum, rest, axes), STEADY)
-    out = np.zeros((*readings.shape, len(found)))
-    for k, (axis, error) in enumerate(found):
-        out[:, axis, k] = error
-    return out
 
 
 def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
@@ -111,70 +88,17 @@ def before_adc(poses: list[FloatArray], step: float) -> BeforeAdc:
     return BeforeAdc(*_core.before_adc(np.concatenate(poses), [len(one) for one in poses], step))
 
 
-def resting_ends(
-    readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray, edges: IntArray
-) -> BoolArray:
-    """Samples (n, 3) of ``axes`` (3,) at the ends of the moves ``edges`` (m, 2) at which the axis is static: in the LSB
-    ``quantum`` (3,) of its static reading ``rest`` (3,), and not rotating yet, or no longer.
-
-    Before its code changes an axis rotates undetected, further in the direction in which the bias is farther from the
-    edge of the LSB: on the mean of both directions as if the position inside the LSB, as a rate, acted for a while;
-    that time is not static. It is taken from the axis' own code changes; an axis without any is as static as the body,
-    and a body without any is static throughout, but for :func:`unseen_rotation`.
-    """
-    out = np.zeros(readings.shape, dtype=np.bool_)
-    for first, last in edges.tolist():
-        part = readings[first:last]
-        if not np.isfinite(part).all():
-            continue
-        away = _away(part, quantum, rest)
-        for ends, inside in ((out[first:last], away), (out[first:last][::-1], away[::-1])):
-            own = {k: _still(inside[:, k] / quantum[k]) for k in np.flatnonzero(axes).tolist()}
-            body = min((n for n in own.values() if n is not None), default=len(part))
-            for k, n in own.items():
-                ends[: body if n is None else n, k] = True
-    return out
-
-
-def unseen_rotation(static: BoolArray, quantum: FloatArray, edges: IntArray) -> FloatArray:
-    """Variance (n, 3) of the readings in those moves ``edges`` (m, 2) in which an axis is ``static`` (n, 3) throughout:
-    it may rotate at any rate inside its LSB ``quantum`` (3,), which is one error of all their readings."""
-    out = np.zeros(static.shape)
-    for first, last in edges.tolist():
-        out[first:last] = np.where(static[first:last].all(axis=0), (last - first) * UNIFORM * quantum**2, 0.0)
-    return out
-
-
-def _away(readings: FloatArray, quantum: FloatArray, rest: FloatArray) -> FloatArray:
-    """Distance (n, 3) from ``rest``, raw, without toggling between neighbouring codes (running median)."""
-    columns = [_core.running_median(np.ascontiguousarray(column), CHATTER) for column in readings.T]
-    return np.maximum(np.abs(np.column_stack(columns) - rest), np.abs(readings - rest) - quantum)
-
-
-def _still(away: FloatArray) -> int | None:
-    """Number of static samples before a rotation, from ``away`` (n,) [LSB] of rest; ``None`` without a code change."""
-    left = [int(np.argmax(away >= step)) if np.any(away >= step) else None for step in STEPS]
-    begin, second, third = left
-    if begin is None:
-        return None
-    if second is None or third is None:
-        return begin
-    took = max(second - begin, 1)
-    return max(begin - round(took * float(np.interp((third - second) / took, *HIDDEN))), 0)
-
-
 def rounding_in_moves(
     readings: FloatArray, quantum: FloatArray, means: FloatArray, axes: BoolArray, edges: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rounding of undithered ``axes`` (3,) in the moves ``edges`` (m, 2): variance (n, 3), 1 where a reading is in the
     LSB of its bias (n, 3), errors (n, 3, k) that all moves share. ``means`` (h, 3) are those of the poses."""
-    coarse = readings, quantum, static_reading(means, quantum), axes
-    variance = rounding_variance(*coarse)
-    if variance is None:
-        return np.zeros(readings.shape), np.zeros(readings.shape), np.zeros((*readings.shape, 0))
-    is_static = resting_ends(*coarse, edges) | resting_axes(*coarse)
-    variance = np.maximum(variance, unseen_rotation(is_static, quantum, edges))
-    return variance, is_static.astype(np.float64), shared_errors(*coarse)
+    adc = quantum, static_reading(means, quantum), axes
+    variance, is_static, shared = _core.rounding_in_moves(readings, adc, edges, STEADY)
+    errors = np.zeros((*readings.shape, len(shared)))
+    for k, (axis, error) in enumerate(shared):
+        errors[:, axis, k] = error
+    return variance, is_static.astype(np.float64), errors
 
 
 def biases_by_codes(
