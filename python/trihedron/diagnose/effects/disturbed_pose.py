@@ -12,6 +12,7 @@ from trihedron.diagnose.effects.contract import (
     acting_on,
     per_axis,
 )
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF
 from trihedron.diagnose.residuals.within_poses import LOUD, loud_poses, pose_scatter
 from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import LEAST_P, RARE_ALARM, SURE
@@ -29,8 +30,6 @@ OUTLYING = 0.25
 """Weight of a move below which its residual is in the tails: χ² above 32 with five degrees of freedom, p = 10⁻⁵."""
 IN_EITHER_HALF = 0.5
 """Share of ``LOUD`` that vibration reaches in both halves of its pose; a disturbance is in one of them."""
-LEAST_DOF = 0.1
-"""Smallest degrees of freedom of a pose: where the fit uses up its rows, rounding errors are no deviation."""
 
 
 def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:

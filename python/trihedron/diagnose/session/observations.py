@@ -46,7 +46,7 @@ class Observations(SessionReadings):
     is the scatter of sampling instants about their timestamps, once a diagnosis has found it.
     ``unresolved`` (m, 4, 3) is the variance of the moves' integrals, (raw unit · s)²: of force and rate by motion
     faster than the samples, then by rounding, slow noise and vibration at the end of a pose.
-    ``support``: that of the poses where it yields, and the gyro's S (3, 3) by which it was found.
+    ``leans`` (poses, 2, 3): of a support that yields, change of the vertical from the mean over a pose to its ends.
     ``averaging`` is the smoothing of the samples by the sensors' filters (eq. 11.6d).
     ``undithered`` (3,) are gyro axes whose noise does not dither the LSB; ``rounding`` (n, 3, k) the derivatives of raw
     rates in moves by k errors of rounding with prior σ ``rounding_sigma`` (k,): place of each of these axes' biases
@@ -63,7 +63,7 @@ class Observations(SessionReadings):
     move_poses: npt.NDArray[np.intp]
     jitter_s: float = 0.0
     unresolved: FloatArray
-    support: tuple[Support, FloatArray] | None = None
+    leans: FloatArray | None = None
     averaging: float = 0.0
     undithered: BoolArray = field(default_factory=lambda: np.zeros(3, dtype=np.bool_))
     rounding: FloatArray | None = None
@@ -119,9 +119,7 @@ class Observations(SessionReadings):
             return self
         seen = self.pose_rate, self.pose_rate_sigma, self.unresolved, self.move_poses[:, 0]
         pose_rate, sigma, unresolved = support.applied(*seen, gyro_S)
-        return replace(
-            self, unresolved=unresolved, pose_rate=pose_rate, pose_rate_sigma=sigma, support=(support, gyro_S)
-        )
+        return replace(self, unresolved=unresolved, pose_rate=pose_rate, pose_rate_sigma=sigma, leans=support.leans)
 
     def norm_sigma(self, gradient: FloatArray) -> FloatArray:
         """(h,) standard errors of the norm of gravity, SI, whose gradient by the raw means is ``gradient`` (h, 3)."""
@@ -167,7 +165,7 @@ class Observations(SessionReadings):
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
             unresolved=np.ascontiguousarray(self.unresolved),
-            leans=np.zeros((self.n_poses, 2, 3)) if self.support is None else self.support[0].leans,
+            leans=np.zeros((self.n_poses, 2, 3)) if self.leans is None else self.leans,
         )
 
 
