@@ -136,10 +136,6 @@ impl SessionModel {
     /// `scatter`: `(2, 3)` raw, the scatter of strength one, and the strength of the accelerometer's scatter that is
     /// expected from its noise inside poses, 0 where there is none.
     #[new]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "named, and a thin seam: each is one part of the session"
-    )]
     #[pyo3(signature = (*, gravity, poses, moves, noise, prior, scatter))]
     fn new(
         py: Python<'_>,
