@@ -20,9 +20,13 @@ from trihedron.session.noise import ANYTHING
 
 HALF_WINDOW = 6
 """Samples on either side of an interval that determine the local motion."""
+NEAR_LIMIT = 0.97
+"""Share of a limit above which a move is excluded, on any axis: the limit belongs to the sensor, not to one axis."""
 BEYOND = 0.1
 """Least share of the parabola on a plateau by which the motion clearly exceeds the limit: one of constant rate does
 not."""
+ABOVE_REST = 1.2
+"""Poses and gentle moves alike come close to a range limit below 1.2 g."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,7 @@ class _Saturation(DirectEffect):
         if not runs:
             return None
         touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
+        touched = self._near_limit(context, runs, touched, raw)
         begins = set(obs.move_poses[touched, 0].tolist())
         channels = tuple(sorted({"ag"[self.sensor] + AXES[r.axis] for r in runs}))
         statement = self.reported(
@@ -129,6 +134,16 @@ class _Saturation(DirectEffect):
         if self.sensor == GYRO:
             return context.si_per_raw(GYRO), np.zeros(3), context.obs.rate_origin
         return context.si_per_raw(ACCELEROMETER), context.fitted.state.accel_b, context.obs.force_origin
+
+    def _near_limit(self, context: Context, runs: list[Plateau], touched: list[int], raw: FloatArray) -> list[int]:
+        """Moves with a plateau and those that come close to the same limit on any axis and side."""
+        scale, bias, origin = self._si(context)
+        limit = min(abs((run.limit.value - origin[run.axis]) * scale[run.axis] + bias[run.axis]) for run in runs)
+        close = {m for m, (a, b) in enumerate(context.obs.move_ranges)
+                 if (np.abs(raw[a:b] * scale + bias).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
+        # An accelerometer with a range of little more than 1 g comes close in every pose: then only plateaus count.
+        is_near_rest = self.sensor == ACCELEROMETER and limit <= ABOVE_REST * context.fitted.state.gravity
+        return touched if is_near_rest else sorted(close | set(touched))
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
         """Limits in SI along every channel, with the exact code where the limit is one code."""
