@@ -319,11 +319,6 @@ class Context:
         raw = obs.force_density, np.zeros(3) if obs.rate_density is None else obs.rate_density
         return np.array([np.sqrt(S**2 @ of**2) for S, of in zip((state.accel_S, state.gyro_S), raw, strict=True)])
 
-    @property
-    def noise_floor(self) -> FloatArray:
-        """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
-        return np.asarray(self.noise_density * np.sqrt(self.obs.recording.rate_hz))
-
 
 def _sensor_axes(S: FloatArray) -> FloatArray:
     """(3, 3) columns: change of corrected readings when one sensor alone reads one unit more along its own axis."""

@@ -146,7 +146,7 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.found.values())
     domains = _disagreeing((*judge_rows(plain.fitted, alpha), *of_samples), settles)
     notify(0.3, "letting effects compete")
-    bare = hypothesis(observed.obs, observed.fitted.state, prior)
+    bare = hypothesis(observed.fitted.obs, observed.fitted.state, prior)
     found = search(bare, alpha)
     notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
@@ -223,7 +223,7 @@ def _explained(answer: Answer, of_samples: Sequence[DomainTest]) -> list[DomainT
 
 def with_relations(domains: tuple[DomainTest, ...], found: Related) -> tuple[DomainTest, ...]:
     """The domains, where those in which a relation shows disagree."""
-    return _disagreeing(domains, {one.domain: float(np.exp(-0.5 * one.score)) for one in found.relations})
+    return _disagreeing(domains, {one.effect.domain: float(np.exp(-0.5 * one.score)) for one in found.relations})
 
 
 def verdict_of(answer: Answer, *, has_relations: bool, is_determined: bool) -> Verdict:

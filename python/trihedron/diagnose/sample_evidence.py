@@ -8,7 +8,6 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence
-from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.records.diagnosis import Candidate
 from trihedron.session.model import misfits
@@ -39,10 +38,6 @@ class Observed:
     seen: tuple[Seen, ...]
     found: Mapping[str, Evidence]
     tested: Mapping[str, Candidate]
-
-    @property
-    def obs(self) -> Observations:
-        return self.fitted.obs
 
 
 def look(context: Context, alpha: float) -> Observed:

@@ -46,7 +46,7 @@ class LeverArm(DirectEffect):
         share = 1.0 - after / before
         if p_value > P_LIMIT:
             return None
-        noise = float((context.noise_floor[0] ** 2).mean())
+        noise = context.obs.recording.rate_hz * float((context.noise_density[0] ** 2).mean())
         rms = math.sqrt(before), math.sqrt(after)
         held = HeldOut("dynamics", before / noise, after / noise, *rms, "m/s^2")
         parameters = per_axis_parameters("r", arm, np.sqrt(np.diag(covariance)), "m")

@@ -150,7 +150,7 @@ def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[Flo
     A scale error grows with the angle and is the same for every rotation about an axis. The weighted median of error
     over angle is robust against single wrong rotations.
     """
-    noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
+    noise = context.noise_density[1].mean()
     quantum, scatter = context.obs.recording.facts.of("gyroscope").step, context.obs.segments.gyroscope_sigma
     assert scatter is not None
     steps = np.where(undithered_axes(quantum, scatter), quantum, 0.0) * np.linalg.norm(

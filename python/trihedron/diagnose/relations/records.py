@@ -24,7 +24,7 @@ def records(found: Related) -> tuple[Relation, ...]:
     out = []
     for k, (one, after) in enumerate(zip(found.relations, models[: len(found.relations)], strict=True)):
         value, covariance = found.model.value(first + k)
-        held = next((h for h in held_out_records(one.before, after) if h.domain == one.domain), None)
+        held = next((h for h in held_out_records(one.before, after) if h.domain == one.effect.domain), None)
         # Share of the held-out sum of squares of its domain that the relation removes.
         left = 1.0 if held is None or not held.rms_before > 0.0 else held.rms_after / held.rms_before
         share = float(np.clip(1.0 - left**2, 0.0, 1.0))

@@ -11,7 +11,6 @@ from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.dependence import Dependence
 from trihedron.diagnose.relations.signals import dependences
 from trihedron.diagnose.relations.telegraph import TELEGRAPH, telegraphs
-from trihedron.records.domains import Domain
 
 MOST_RELATIONS = 3
 """A longer list is no relation that a person would check."""
@@ -25,11 +24,6 @@ class Follows:
     term: Term
     score: float
     before: Hypothesis
-
-    @property
-    def domain(self) -> Domain:
-        """The domain of residuals in which it shows."""
-        return self.effect.domain
 
 
 @dataclass(frozen=True, eq=False)
