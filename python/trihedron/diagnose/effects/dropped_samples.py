@@ -8,16 +8,17 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import MOST_NAMED, DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
-from trihedron.diagnose.hypothesis import hypothesis
 from trihedron.diagnose.session.lost_samples import with_gaps, with_inserted
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import move_residuals
-from trihedron.probability import LN_FAULT, chdtri
+from trihedron.diagnose.session.solve import fit, move_residuals
+from trihedron.probability import CLEAR, LN_FAULT, chdtri
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.session.joints import joints, most_lost
-from trihedron.session.model import SessionState
+from trihedron.session.model import Prior, SessionState
 
+CONTRADICTS, FEWEST_MOVES = 10.0, 3
+"""Misfit, in medians of all moves, above which a move contradicts the session: by chance one in thirty million."""
 ROWS = 5
 """Rows of a move: gravity after it, velocity over it."""
 
@@ -58,8 +59,7 @@ def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
     doubtful = [one for one in sorted(losses, key=lambda one: -one.gain) if not one.is_certain]
     touched = set(list(dict.fromkeys(one.move for one in doubtful))[: obs.n_moves // 2])
     whole = with_gaps(obs, {one.sample: one.count for one in losses if one.is_certain})
-    # Moves with other losses are in the tails of the noise that fits the others.
-    clean = hypothesis(whole.without_moves(touched), context.fitted.state, context.fitted.prior).fitted.state
+    clean = _of_moves_that_agree(whole.without_moves(touched), context.fitted.state, context.fitted.prior)
     misfit = (move_residuals(whole, clean) ** 2).sum(axis=1)
     usual = max(float(np.median([v for m, v in enumerate(misfit) if m not in touched])) / chdtri(ROWS, 0.5), 1.0)
     counted: list[Loss] = []
@@ -132,6 +132,18 @@ class _Move:
         return float(max(0.3, np.sqrt(max(best / ROWS, 1.0) / max(float(np.mean(beside)), 1e-3))))
 
 
+def _of_moves_that_agree(obs: Observations, state: SessionState, prior: Prior | None) -> SessionState:
+    """The session without moves that contradict it: an undetected loss must not bias the reference of the others."""
+    for _ in range(obs.n_moves):
+        state = fit(obs, state, prior).state
+        misfit = (move_residuals(obs, state) ** 2).sum(axis=1)
+        bad = {int(m) for m in np.flatnonzero(misfit > CONTRADICTS * np.median(misfit))}
+        if not bad or obs.n_moves - len(bad) < FEWEST_MOVES:
+            return state
+        obs = obs.without_moves(bad)
+    return state
+
+
 class DroppedSamples(DirectEffect):
     """Both sensors skip the same whole number of samples at once; with these inserted the motion is smooth."""
 
@@ -141,6 +153,8 @@ class DroppedSamples(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)
+        # A jolt looks like a loss; gravity then gives a count of zero, or one that is not significant.
+        losses = [loss for loss in losses if loss.count > CLEAR * sigmas[loss.sample]]
         if not losses:
             return None
         obs = context.obs
