@@ -161,14 +161,14 @@ def test_a_check_predicts_the_error_bars_that_the_calibration_has(recording, res
 
 @pytest.mark.parametrize("fit", ["calibrate_joint", "calibrate_moves"])
 def test_a_defect_inside_a_fit_is_an_error_and_a_refusal_leaves_the_gyro_out(fit, recording, monkeypatch):
-    calibrating = importlib.import_module("trihedron.api.calibrating")
+    methods = importlib.import_module("trihedron.api.calibrating_methods")
     method = "joint" if fit == "calibrate_joint" else "separate"
 
     def ends(error):
         def raising(*_, **__):
             raise error
 
-        monkeypatch.setattr(calibrating_methods, fit, raising)
+        monkeypatch.setattr(methods, fit, raising)
         return calibrate(recording, method=method, gravity_m_s2=9.81)
 
     with pytest.raises(ValueError, match="broadcast"):
