@@ -18,7 +18,6 @@ from trihedron.errors import InputError
 from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.log import write_recording
 from trihedron.files.output import write_whole
-from trihedron.gravity import normal_gravity
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Truth
 from trihedron.records.results import CalibrationResult, DiagnosisResult, VerificationResult
 from trihedron.report.calibration import calibration_report
@@ -154,7 +153,7 @@ def truth_of_the_day(scenario: Scenario, seed: int) -> Truth:
 
 
 def _scenario(layout: int) -> Scenario:
-    place = Environment(gravity_m_s2=normal_gravity(LATITUDE_DEG))
+    place = Environment(gravity_m_s2=0.0, latitude_deg=LATITUDE_DEG, earth_rate=True)
     return replace(scenario_by_name("hand-session"), motion=hand_session(layout=layout), environment=place)
 
 
