@@ -246,3 +246,19 @@ def test_nine_poses_for_nine_parameters_test_nothing():
     assert {one.code for one in found.findings} == {"few-poses"}
     _, alone = calibrate_norm(readings, np.full((9, 3), 0.01), GRAVITY, raw_unit="counts")
     assert "few-poses" in {one.code for one in alone}
+
+
+def test_the_filter_agrees_with_the_batch_fit_on_xsens_mti(real_data):
+    """The batch fit knows one standard error per mean; the filter gets it as variance on top of next to nothing."""
+    folder, gravity = real_data / "xsens_mti", 9.81744
+    recording = trihedron.read(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
+    poses = pose_readings(recording, segment_recording(recording))
+    batch, _ = calibrate_norm(poses.mean, poses.sigma_mean, gravity)
+    tiny = [AxisNoise(white=1e-3 * np.median(sigma) * np.sqrt(np.median(poses.pose_s))) for sigma in poses.sigma_mean.T]
+    run = {"start_s": poses.start_s, "pose_s": poses.pose_s, "gravity_m_s2": gravity}
+    got = calibrate_without_references(poses.mean, tiny, extra_variance=poses.sigma_mean**2, **run).accelerometer
+    scale = np.concatenate([batch.sigma_S.ravel(), batch.sigma_b])
+    difference = np.concatenate([(got.S - batch.S).ravel(), got.b - batch.b])
+    free = scale > 0
+    # Both minimise the same sum; the filter also corrects the lengthening of a noisy vector, tr(Σ)/2g ~ 1e-3 σ.
+    assert np.max(np.abs(difference[free] / scale[free])) < 0.01

@@ -13,6 +13,7 @@ import pytest
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from small_session import rejected
+from trihedron import _core
 from trihedron.api import identifying, streaming
 from trihedron.cli import main
 from trihedron.files import checkpoint as kept_file
@@ -226,3 +227,20 @@ def test_the_commands_keep_and_go_on(path, tmp_path, capsys):
     assert not kept.exists()
     assert main(said[:-2]) == status
     assert capsys.readouterr().out == with_it
+
+
+def test_the_state_of_another_stream_is_refused():
+    stream = _core.AllanStream(1, [1, 2, 100000], _core.AllanStream.LEAST_BUDGET)
+    stream.extend(np.arange(300.0)[:, None])
+    state = stream.state()
+    for other in (
+        _core.AllanStream(1, [1, 2, 3], _core.AllanStream.LEAST_BUDGET),
+        _core.AllanStream(2, [1, 2, 100000], _core.AllanStream.LEAST_BUDGET),
+    ):
+        with pytest.raises(ValueError, match="state"):
+            other.restore(state)
+    numbers, fine, window, sums = state[0]
+    own = _core.AllanStream(1, [1, 2, 100000], _core.AllanStream.LEAST_BUDGET)
+    for bad in (np.full(6, np.nan), numbers[:5], numbers + np.eye(6)[3], numbers * (1 + 2 * np.eye(6)[4])):
+        with pytest.raises(ValueError, match="state"):
+            own.restore([(bad, fine, window, sums)])
