@@ -31,7 +31,7 @@ from trihedron.session.noise import NOISE_DOF
 DECIBEL = 20.0 / math.log(10.0)
 FEWEST_POSES = 4
 """Two poses in either half."""
-NOISE_IN_POSES = frozenset({"N", "B", "Q", "octave", "bandwidth", "resolution", "line"})
+NOISE_IN_POSES = frozenset({"N", "B", "Q", "octave", "bandwidth", "resolution"})
 """Noise terms that change the octaves of a pose."""
 
 

@@ -104,7 +104,7 @@ class ParameterDifference(Plain):
 
 
 NoiseTerm = Literal[
-    "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution",
+    "N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "jitter", "octave", "distribution",
     "unit", "frame", "correlation-time", "poses", "moves",
 ]  # fmt: skip
 
