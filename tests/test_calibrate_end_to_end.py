@@ -11,6 +11,7 @@ import trihedron
 from trihedron.api.calibrating import calibrate
 from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
 from trihedron.errors import InputError
+from trihedron.estimate.verification import _beyond
 from trihedron.records import Finding
 from trihedron.simulate import hand_session, scenario_by_name, simulate, with_effect
 from trihedron.units import STANDARD_GRAVITY_M_S2 as G
@@ -146,6 +147,9 @@ def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit
     # 0.9 m/s² more of one bias is an error of 50 mg rms: above a limit of 200 mg there is a remark only.
     wide = trihedron.verify(result, other, limit_mg=200.0)
     assert {f.severity.value for f in wide.findings if f.code == "residual-above-noise"} == {"warning"}
+    # One pose has no others that would be as expected.
+    assert not _beyond(np.array([100.0]), 1).is_single
+    assert _beyond(np.array([100.0, 1.0, 1.0]), 1).is_single
     # A change of a few times the uncertainties is a warning.
     slightly = replace(SCENARIO, accelerometer=replace(SCENARIO.accelerometer, b=(0.303, -0.3834, 0.1025)))
     near, _ = simulate(slightly, 13)

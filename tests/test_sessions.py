@@ -125,6 +125,7 @@ def test_a_recording_that_cannot_be_calibrated_is_left_out_and_dates_that_logs_l
     still = Recording(np.arange(500) / 50.0, np.tile([0.0, 0.0, G], (500, 1)) + 1e-3, None, 50.0, source="still.csv")
     result = trihedron.calibrate_sessions([*four_sessions[:2], still], gravity_m_s2=G)
     assert result.model.left_out[0][0] == "still.csv"
+    assert result.findings == result.model.findings
     assert len(result.model.sessions) == 2
     with pytest.raises(ValueError, match="two recordings at least"):
         trihedron.calibrate_sessions([four_sessions[0], still], gravity_m_s2=G)

@@ -279,7 +279,7 @@ def _beyond(z2: FloatArray, n_components: int) -> _Beyond | None:
     if probability.chdtrc(n_components * len(z2), float(z2.sum())) > probability.FALSE_ALARM:
         return None
     times = float(np.sqrt(np.mean(z2) / n_components))
-    others = probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max()))
+    others = probability.chdtrc(n_components * (len(z2) - 1), float(z2.sum() - z2.max())) if len(z2) > 1 else 0.0
     return _Beyond(times, times > FAR_BEYOND, others > probability.FALSE_ALARM)
 
 

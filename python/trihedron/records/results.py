@@ -241,7 +241,7 @@ class KalmanResult(Judged, Printed):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SessionsResult(Printed):
+class SessionsResult(Judged, Printed):
     """Many recordings as one model, with each recording's own calibration. ``print`` gives the report.
 
     Attributes
@@ -268,9 +268,9 @@ class SessionsResult(Printed):
         return self.model.calibration
 
     @property
-    def is_trustworthy(self) -> bool:
-        """No serious finding."""
-        return self.model.is_trustworthy
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings on all recordings together; those on one are its result's."""
+        return self.model.findings
 
     def __repr__(self) -> str:
         return f"<SessionsResult of {len(self.model.sessions)} recordings by {self.model.by}>"
