@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from confidence.motion import G, attitude
+from confidence.motion import EARTH_RAD_S, G, attitude
 from confidence.sensor import DEG, Truth, one_over_f
 from confidence.sessions import directions
 from motion import running_product
@@ -123,7 +123,7 @@ def _motion(of, rng):
     w, a = np.vstack(rates), np.vstack(pushes) + np.array([0.0, 0.0, G])
     # At the middle of each step, as the rates are: half a step apart is a delay between the sensors.
     middle = Rotation.concatenate(turned)[:-1] * Rotation.from_rotvec(0.5 * dt * w)
-    return w, middle.inv().apply(a), np.concatenate(rest), per
+    return w + middle.inv().apply(EARTH_RAD_S), middle.inv().apply(a), np.concatenate(rest), per
 
 
 def _sampled(values, per, sampling):

@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 from motion import running_product
 
 G = 9.8137
+EARTH_RAD_S = 7.2921e-5 * np.array([np.cos(0.87), 0.0, np.sin(0.87)])
+"""The Earth's rotation in the room, its X axis northward, at a latitude of 50°."""
 
 
 @dataclass
@@ -27,8 +29,8 @@ class Step:
 
 @dataclass
 class Motion:
-    """Rate ``w`` (n, 3) in the body at the middle of each step, attitudes ``q`` (n + 1,) at its ends, linear
-    acceleration ``a`` (n, 3) in the room; ``rests`` are times [s]."""
+    """Rate ``w`` (n, 3) of the body, the Earth's included, at the middle of each step, attitudes ``q`` (n + 1,) at its
+    ends, linear acceleration ``a`` (n, 3) in the room; ``rests`` are times [s]."""
 
     step: float
     w: np.ndarray
@@ -111,4 +113,6 @@ def move(steps, start, rng, rate_hz, tremor=0.0, tilt=0.0, push=0.3):
         pushes.append(a)
         blocks.append(path)
         clock += n * dt
-    return Motion(dt, np.vstack(rates), Rotation.concatenate(blocks), np.vstack(pushes), rests, turns), per
+    path = Rotation.concatenate(blocks)
+    rate = np.vstack(rates) + path[:-1].inv().apply(EARTH_RAD_S)
+    return Motion(dt, rate, path, np.vstack(pushes), rests, turns), per
