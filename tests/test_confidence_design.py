@@ -10,6 +10,7 @@ import trihedron
 from confidence.design import drawn, session
 from confidence.motion import G
 from confidence.sensor import lower, recorded
+from confidence.sessions import hand
 from trihedron import calibrate
 from trihedron.api.planning import POSE_SETS
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
@@ -209,3 +210,9 @@ def test_turns_that_determine_nothing_are_refused_in_words():
         design_turns([0.0], 1.0, 1.0, N)
     with pytest.raises(ValueError, match="must be positive"):
         design_turns([90.0], 1.0, 0.0, N)
+
+
+@pytest.mark.parametrize("seed", [3400002, 3400009])
+def test_moves_of_half_a_minute_under_the_earths_rotation_look_like_no_lost_samples(seed):
+    force, rate, rate_hz, _, _ = hand(seed, move_s=30.0)
+    assert calibrate(recorded(force, rate, rate_hz), gravity_m_s2=G).is_trustworthy

@@ -14,7 +14,8 @@ from trihedron import calibrate, diagnose, verify
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import _folds, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
-from trihedron.estimate.session.observed import turned_with_earth
+from trihedron.estimate.attitude import integrate_rate
+from trihedron.estimate.session.observed import _left_by_earth, turned_with_earth
 from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_up
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
@@ -291,6 +292,21 @@ def test_the_earth_rate_that_a_pose_of_unknown_heading_reads_is_in_the_error_of_
     latitude = np.arcsin(rng.uniform(-1.0, 1.0, len(up))) if latitude_deg is None else np.radians(latitude_deg)
     world = np.stack(np.broadcast_arrays(np.cos(latitude), 0.0 * up[:, 0], np.sin(latitude)), axis=1)
     read = EARTH_RATE_RAD_S * body.inv().apply(world) - earth_rate_up(latitude_deg) * up
-    variance = turned_with_earth(latitude_deg, up, S)
+    inverse = np.linalg.inv(S)
+    variance = np.einsum("ai,nij,aj->na", inverse, turned_with_earth(latitude_deg, up), inverse)
     # Of 200 000 poses the mean square is certain to 0.5 %.
-    np.testing.assert_allclose(np.mean((read @ np.linalg.inv(S).T) ** 2, axis=0), variance.mean(axis=0), rtol=0.02)
+    np.testing.assert_allclose(np.mean((read @ inverse.T) ** 2, axis=0), variance.mean(axis=0), rtol=0.02)
+
+
+def test_the_earth_rate_that_a_slow_move_turns_away_from_a_linear_bias_is_in_the_error_of_its_rotation():
+    time_s = np.linspace(0.0, 30.0, 601)
+    rate = np.sin(np.pi * time_s / 30.0)[:, None] * [0.08, -0.05, 0.03]
+    attitude = integrate_rate(time_s, rate)
+    rng = np.random.default_rng(3)
+    earth = EARTH_RATE_RAD_S / np.sqrt(3.0) * rng.standard_normal((2000, 3))
+    read = np.einsum("nij,ki->knj", attitude, earth)
+    linear = read[:, :1] + (time_s / 30.0)[:, None] * (read[:, -1:] - read[:, :1])
+    left = np.einsum("nij,knj->kni", attitude, read - linear).sum(axis=1) * 0.05
+    variance = _left_by_earth(EARTH_RATE_RAD_S**2 / 3.0 * np.eye(3), time_s, rate)
+    # Of 2000 times three the mean square is certain to 2 %.
+    assert np.mean(left**2) == pytest.approx(variance, rel=0.1)

@@ -9,6 +9,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.gravity import earth_rate_up, unknown_earth_rate
 from trihedron.records import Recording, Segments
@@ -127,9 +128,12 @@ def arranged(
         seen = pose_rate, own["pose_rate_sigma"], unresolved, moves_before
         pose_rate, own["pose_rate_sigma"], unresolved = support.applied(*seen, near[2])
         leans = support.leans
-    # The heading of a pose is unknown, and so is the horizontal part of the Earth's rotation in its axes.
-    turned = turned_with_earth(recording.latitude_deg, up, near[2])
-    own["pose_rate_sigma"] = np.sqrt(own["pose_rate_sigma"] ** 2 + turned)
+    inverse, earth = np.linalg.inv(near[2]), turned_with_earth(recording.latitude_deg, up)
+    of_poses = np.einsum("ai,nij,aj->na", inverse, earth, inverse)
+    own["pose_rate_sigma"] = np.sqrt(own["pose_rate_sigma"] ** 2 + of_poses)
+    for k, ((a, b), pose) in enumerate(zip(ranges, before, strict=True)):
+        turning = (measured.rate[a:b] - measured.bias_read[pose]) @ near[2].T
+        unresolved[k, 3] += _left_by_earth(earth[pose], measured.time_s[a:b], turning) * np.sum(inverse**2, axis=1)
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
         time_s=measured.time_s,
@@ -155,11 +159,21 @@ def arranged(
     )  # fmt: skip
 
 
-def turned_with_earth(latitude_deg: float | None, up: FloatArray, S: FloatArray) -> FloatArray:
-    """Variance (n, 3), raw, that the Earth's rotation adds to the mean rates of poses with directions ``up`` (n, 3)."""
+def turned_with_earth(latitude_deg: float | None, up: FloatArray) -> FloatArray:
+    """Covariances (n, 3, 3) [rad²/s²] of what is not known of the Earth's rotation in poses of unknown heading with
+    directions ``up`` (n, 3)."""
     across, along = np.square(unknown_earth_rate(latitude_deg))
-    inverse = np.linalg.inv(S)
-    return np.asarray(across * np.sum(inverse**2, axis=1) + (along - across) * (up @ inverse.T) ** 2)
+    return np.asarray(across * np.eye(3) + (along - across) * up[:, :, None] * up[:, None, :])
+
+
+def _left_by_earth(earth: FloatArray, time_s: FloatArray, rate: FloatArray) -> float:
+    """Variance [rad²] along an axis that the Earth's rotation, of covariance ``earth`` (3, 3) in the pose before, adds
+    to the integral of a move's ``rate`` (n, 3), beside biases that are linear between its poses and contain it."""
+    attitude = integrate_rate(time_s, rate)
+    share = ((time_s - time_s[0]) / (time_s[-1] - time_s[0]))[:, None, None]
+    between = (1.0 - share) * np.eye(3) + share * attitude[-1].T
+    left = np.trapezoid(np.eye(3) - attitude @ between, time_s, axis=0)
+    return float(np.trace(left @ earth @ left.T)) / 3.0
 
 
 def _effects(
