@@ -191,7 +191,8 @@ def test_the_zero_of_a_session_is_that_of_its_middle():
 
 def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():
     f, w, rate, _, _ = hand(9002, move_s=1.5, gyro_flicker=np.radians(20.0 / 3600.0), accel_flicker=0.3e-3 * G)
-    assert diagnose(recorded(f, w, rate), gravity_m_s2=G).verdict == "consistent"
+    # The Earth turns below the body, and may show.
+    assert {one.id for one in diagnose(recorded(f, w, rate), gravity_m_s2=G).effects} <= {"earth-rate"}
 
 
 def log(seed, share=(0.0, 0.0, 0.0), tau_s=2.0, drift=0.0, tilt_rad=0.0):

@@ -150,7 +150,8 @@ def test_a_table_at_a_constant_rate_is_at_no_range_limit_though_moves_disagree()
     quadratic = 4e-4 * (force @ truth.S_f.T + truth.b_f) ** 2
     force = force + np.round(np.linalg.solve(truth.S_f, quadratic.T).T)
     found = trihedron.diagnose(recorded(force, rate, rate_hz), gravity_m_s2=9.80665)
-    assert [one.id for one in found.effects] == ["accel-quadratic"]
+    # The Earth turns below the machine, and may show.
+    assert {one.id for one in found.effects} - {"earth-rate"} == {"accel-quadratic"}
 
 
 def test_a_gyro_whose_moves_are_all_beyond_its_range_is_not_extended():

@@ -49,7 +49,8 @@ def made(seed, rate_hz, move_s, before=([1.0], [1.0]), after=([1.0], [1.0]), lat
 def test_filtered_samples_of_quick_moves_are_explained_without_an_effect(how):
     recording, truth = made(*how)
     result = trihedron.diagnose(recording, gravity_m_s2=G)
-    assert (result.verdict, result.effects) == ("consistent", ())
+    # The Earth turns below the body, and may show.
+    assert {one.id for one in result.effects} <= {"earth-rate"}
     found = result.calibration.gyroscope
     # Nine parameters, of which one in 10⁴ exceeds four standard errors.
     assert (np.abs(found.S - truth.S_w) < 4.0 * found.sigma_S).all()
@@ -66,7 +67,7 @@ def test_a_low_pass_of_one_sensor_has_its_lag_and_smoothing_and_no_delay_beside_
     one, lag = pole(0.016 / n_poles)
     both = (np.convolve(one[0], one[0]), np.convolve(one[1], one[1])) if n_poles == 2 else one
     result = trihedron.diagnose(made(seed, 100, 1.2, before=both, only=sensor)[0], gravity_m_s2=G)
-    (effect,) = result.effects
+    (effect,) = (one for one in result.effects if one.id != "earth-rate")
     found = {p.name.rpartition("_")[2]: p for p in effect.parameters}
     assert effect.id == "sensor-lag"
     # Of normal errors one in 10⁴ exceeds four standard deviations; the next term of the response is of third order, a

@@ -89,9 +89,8 @@ def arranged(
     before = []
     for (start, stop), (pose, after), is_used in zip(measured.edges, measured.links, used, strict=True):
         a, b = int(start) - int(rows[start] > 0), int(stop) + int(rows[stop - 1] < n - 1)
-        if not is_used or after != pose + 1 or b - a < 3 or not np.isfinite(readings[a:b]).all():
-            continue
-        if not np.isfinite(measured.rate[a:b]).all():
+        is_whole = np.isfinite(readings[a:b]).all() and np.isfinite(measured.rate[a:b]).all()
+        if not is_used or after != pose + 1 or b - a < 3 or not is_whole:
             continue
         ranges.append((a, b))
         before.append(pose)
@@ -131,9 +130,7 @@ def arranged(
     inverse, earth = np.linalg.inv(near[2]), turned_with_earth(recording.latitude_deg, up)
     of_poses = np.einsum("ai,nij,aj->na", inverse, earth, inverse)
     own["pose_rate_sigma"] = np.sqrt(own["pose_rate_sigma"] ** 2 + of_poses)
-    for k, ((a, b), pose) in enumerate(zip(ranges, before, strict=True)):
-        turning = (measured.rate[a:b] - measured.bias_read[pose]) @ near[2].T
-        unresolved[k, 3] += _left_by_earth(earth[pose], measured.time_s[a:b], turning) * np.sum(inverse**2, axis=1)
+    unresolved[:, 3] += np.outer(_of_moves(earth, measured, ranges, before, near[2]), np.sum(inverse**2, axis=1))
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
         time_s=measured.time_s,
@@ -164,6 +161,16 @@ def turned_with_earth(latitude_deg: float | None, up: FloatArray) -> FloatArray:
     directions ``up`` (n, 3)."""
     across, along = np.square(unknown_earth_rate(latitude_deg))
     return np.asarray(across * np.eye(3) + (along - across) * up[:, :, None] * up[:, None, :])
+
+
+def _of_moves(
+    earth: FloatArray, measured: MoveMeasurements, ranges: list[tuple[int, int]], before: list[int], S: FloatArray
+) -> list[float]:
+    """:func:`_left_by_earth` of every move, by the rates that are read."""
+    return [
+        _left_by_earth(earth[k], measured.time_s[a:b], (measured.rate[a:b] - measured.bias_read[k]) @ S.T)
+        for (a, b), k in zip(ranges, before, strict=True)
+    ]
 
 
 def _left_by_earth(earth: FloatArray, time_s: FloatArray, rate: FloatArray) -> float:
