@@ -260,9 +260,9 @@ class Moves:
     def path(self, scale: float) -> _Path:
         """The most likely path through ``STATES`` of a gyro whose scale is ``scale`` [rad/s per unit]."""
         density = np.empty((len(self.edges), len(STATES)))
-        for k in range(0, len(STATES), len(PROPER)):
-            sign, ratio, _ = STATES[k]
-            rotation, angle = self._integrated(sign * ratio * scale)
+        first = range(0, len(STATES), len(PROPER))
+        factors = np.array([STATES[k][0] * STATES[k][1] * scale for k in first])
+        for k, rotation, angle in zip(first, *self._integrated(factors), strict=True):
             # A gyro of axes P turns by P R Pᵀ; a reflection -P by R of the opposite rates.
             predicted = np.einsum("sab,mbc,sdc,md->msa", PROPER, rotation, PROPER, self.after, optimize=True)
             variance = (self.direction**2 + (SCALE * angle) ** 2)[:, None]
@@ -270,15 +270,17 @@ class Moves:
             density[:, k : k + len(PROPER)] = -0.5 * miss - np.log(2.0 * np.pi * variance)
         return _most_likely(density, -math.log(4.0 * math.pi))
 
-    def _integrated(self, scale: float) -> tuple[FloatArray, FloatArray]:
-        """Rotations (m, 3, 3) and the angles turned (m,)."""
-        rotation, angle = np.tile(np.eye(3), (len(self.edges), 1, 1)), np.zeros(len(self.edges))
+    def _integrated(self, scales: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rotations (s, m, 3, 3) and the angles turned (s, m) by each scale."""
+        n = len(self.edges)
+        rotation, size = np.tile(np.eye(3), (len(scales), n, 1, 1)), np.zeros(n)
         for k in range(int(np.diff(self.edges, axis=1).max())):
             on = np.flatnonzero(self.edges[:, 0] + k < self.edges[:, 1])
-            vector = scale * (self.turned[self.edges[on, 0] + k] - self.bias[on])
-            rotation[on] = rotation[on] @ _core.rotation_from_vector(vector)
-            angle[on] += np.linalg.norm(vector, axis=1)
-        return rotation, angle
+            rate = self.turned[self.edges[on, 0] + k] - self.bias[on]
+            step = _core.rotation_from_vector((scales[:, None, None] * rate).reshape(-1, 3))
+            rotation[:, on] = rotation[:, on] @ step.reshape(len(scales), len(on), 3, 3)
+            size[on] += np.linalg.norm(rate, axis=1)
+        return rotation, np.abs(scales)[:, None] * size
 
 
 @dataclass(frozen=True, eq=False)
