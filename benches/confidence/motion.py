@@ -109,10 +109,8 @@ def move(steps, start, rng, rate_hz, tremor=0.0, tilt=0.0, push=0.3):
             rests.append((clock, clock + n * dt))
         path = q * running_product(w * dt)
         q = path[-1]
-        rates.append(w)
+        rates.append(w + path.inv().apply(EARTH_RAD_S))
         pushes.append(a)
         blocks.append(path)
         clock += n * dt
-    path = Rotation.concatenate(blocks)
-    rate = np.vstack(rates) + path[:-1].inv().apply(EARTH_RAD_S)
-    return Motion(dt, rate, path, np.vstack(pushes), rests, turns), per
+    return Motion(dt, np.vstack(rates), Rotation.concatenate(blocks), np.vstack(pushes), rests, turns), per
