@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
@@ -177,7 +177,7 @@ def _left_by_earth(earth: FloatArray, time_s: FloatArray, rate: FloatArray) -> f
     """Variance [rad²] along an axis that the Earth's rotation, of covariance ``earth`` (3, 3) in the pose before, adds
     to the integral of a move's ``rate`` (n, 3), beside biases that are linear between its poses and contain it."""
     attitude = integrate_rate(time_s, rate)
-    share = ((time_s - time_s[0]) / (time_s[-1] - time_s[0]))[:, None, None]
+    share = ((time_s - time_s[0]) / max(time_s[-1] - time_s[0], TINY))[:, None, None]
     between = (1.0 - share) * np.eye(3) + share * attitude[-1].T
     left = np.trapezoid(np.eye(3) - attitude @ between, time_s, axis=0)
     return float(np.trace(left @ earth @ left.T)) / 3.0
