@@ -193,11 +193,29 @@ def test_rows_written_twice_are_dropped_where_samples_share_timestamps_too(tmp_p
     assert recording.rate_hz == pytest.approx(100, rel=1e-4)
 
 
-def test_a_sensor_read_faster_than_it_measures_has_no_copies(tmp_path):
+@pytest.mark.parametrize(("times", "jitter"), [(2.0, 0.0), (2.37, 0.05), (9.1, 0.3)])
+def test_a_log_read_faster_than_the_sensor_measures_is_read_as_what_the_sensor_measured(tmp_path, times, jitter):
     table, rng = counts(), np.random.default_rng(4)
-    table[:, 1:] = table[np.arange(N) // 2 * 2, 1:]
-    table[:, 0] = np.maximum.accumulate(table[:, 0] + rng.exponential(5e-3, N)).round(3)
-    assert np.count_nonzero(np.diff(table[:, 0]) == 0) > 100
+    step = 0.01 / times * np.maximum(1.0 + jitter * rng.standard_normal(int(times * N)), 0.05)
+    polled_s = table[0, 0] + np.cumsum(step)
+    polled_s = polled_s[polled_s < table[-1, 0]]
+    row = np.searchsorted(table[:, 0], polled_s, side="right") - 1
+    recording = read(tmp_path, np.column_stack([polled_s, table[row, 1:]]))
+    np.testing.assert_array_equal(recording.accelerometer, table[np.unique(row), 1:4])
+    again = finding(recording, "repeated-rows")
+    assert again.numbers["rows_left_out"] == len(row) - len(np.unique(row))
+    assert again.severity is Severity.WARNING
+    assert recording.rate_hz == pytest.approx(100, rel=1e-3)
+
+
+def test_no_sample_of_a_coarse_sensor_that_is_knocked_at_times_counts_as_read_again(tmp_path):
+    # Noise below the LSB, and knocks that change all axes at once: samples that are equal are no less samples.
+    rng = np.random.default_rng(6)
+    knocked = (np.arange(N) % 50 < 10)[:, None]
+    table = counts()
+    table[:, 1:] = np.round(
+        100.0 * table[0, 1:] / np.abs(table[0, 1:]).max() + (0.1 + 2.0 * knocked) * rng.standard_normal((N, 6))
+    )
     assert read(tmp_path, table).n_samples == N
 
 

@@ -60,8 +60,8 @@ def _clipped(sensor: str, limits: list[Limit], place: Place, *, is_static: bool)
 Place = Callable[[int], str]
 LAGS = 8
 """Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
-MANY, HALF = 0.05, 0.5
-"""Shares of a log that are not finite, or repeated, from which on the finding is serious."""
+MANY = 0.05
+"""Share of a log that is not finite from which on the finding is serious."""
 
 
 def audit_readings(
@@ -109,7 +109,6 @@ def _repeated(sensor: str, readings: FloatArray, repeats: Repeats, place: Place)
     return [
         Finding.of(
             "repeated-rows",
-            severity=Severity.WARNING if seen < HALF else Severity.SERIOUS,
             sensor=short(sensor),
             count=int(repeats.count[3]),
             fraction=seen,

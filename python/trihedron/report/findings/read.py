@@ -190,6 +190,12 @@ _ROWS = {
         "{rows_left_out} rows are copies of the row before, timestamp included (first: {where}); they were excluded.",
         "A logger that writes a row twice, or a stream joined with itself.",
     ),
+    ("repeated-rows", "read-again", WARNING): Words(
+        "{rows_left_out} rows ({share:.3g %}) repeat all readings of the row before (first: {where}); they are no "
+        "samples and were excluded.",
+        "A program that reads the sensor more often than it measures.",
+        "Wait for the data-ready signal of the sensor: a polled reading is late by up to the time between two rows.",
+    ),
     ("samples-lost", "bytes-skipped", WARNING): Words(
         "{bytes} bytes at {count} places of the log are damaged and were skipped, readings among them.",
         _CUT_OFF,

@@ -38,9 +38,8 @@ ENTRIES = {
     ("repeated-rows", "", WARNING): Words(
         "The {sensor} repeats its last reading in {count} rows ({fraction:.3g %}; chance would give {chance:.2g %}); "
         "the longest run is {longest_run} rows from {where}.",
-        "The log is faster than the sensor, or the logger repeats a value when it has no new one.",
-        "Noise and uncertainties count repeated rows as new; log at the sensor's own rate.",
-        or_severity=SERIOUS,
+        "The log is faster than this sensor, or the logger repeats a value when it has no new one.",
+        "A repeated reading is late by up to the length of its run; log at the sensor's own rate.",
     ),
     ("invalid-readings", "isolated", WARNING): Words(
         "{count:# single reading} {count:?leaps|leap} away from both neighbours, on one axis alone or with one value "
