@@ -257,3 +257,16 @@ def test_error_along_the_vertical_is_the_noise_alone_where_poses_settle():
     assert min(np.median(one.accelerometer_sigma_mean) for one in found) > 2.0 * white
     along = [np.median(one.accelerometer_sigma_up) for one in found]
     assert 0.85 * white < np.median(along) < 1.3 * white
+
+
+def test_motion_hidden_by_long_gaps_is_as_uncertain_as_it_is():
+    # Bursts of 50 to 400 ms, 30 % of the log: many hide the middle of a move, which turns faster than its ends.
+    f, w, rate, truth, _ = hand(5001)
+    rng, kept = np.random.default_rng([77, 5001]), np.ones(len(f), dtype=bool)
+    while kept.mean() > 0.7:
+        start = rng.integers(0, len(f))
+        kept[start : start + rng.integers(5, 40)] = False
+    result = calibrate(recorded(f[kept], w[kept], rate, np.flatnonzero(kept) / rate), gravity_m_s2=G)
+    z, _ = gyro_z(result, lower(truth))
+    assert np.abs(z).max() < 4.0
+    assert np.sqrt(np.mean(z**2)) < 1.8

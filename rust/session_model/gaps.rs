@@ -1,25 +1,31 @@
 //! Error of an integral over samples that a log lost, beyond what their neighbours determine.
+//!
+//! It is measured: the same interpolation is made across samples that are there, in all moves of the session. Near the
+//! gap in its move the error is more its own than elsewhere: the mean square is estimated from the nearest places, with
+//! that of the session as its prior.
 
 use nalgebra::Vector3;
 
-use crate::poisson::StepWeights;
+use super::moves::Move;
 
 /// A step longer than this many usual ones has lost samples.
 pub const GAP: f64 = 1.5;
-/// Fewest places in the move with as many complete samples: fewer do not determine the curvature of its motion.
-const FEWEST: usize = 12;
-
 /// Places nearest to a gap that count: motion is quicker in the middle of a move than at its ends.
 const NEAREST: usize = 24;
+/// Places that the session's mean square is worth: those of one move describe it within a factor of two or so.
+const PRIOR_PLACES: f64 = 4.0;
+
+/// Squares of force and rate.
+type Squares = [Vector3<f64>; 2];
 
 /// A step over lost samples.
 #[derive(Debug, Clone)]
 pub struct Gap {
     /// Index of the step in the move.
     pub step: usize,
-    /// Mean square error of the same interpolation near it in the move, where nothing was lost: integrals of force
-    /// and rate, (raw unit · s)². `None` where the move is too short.
-    pub square: Option<[Vector3<f64>; 2]>,
+    /// Mean square error of the same interpolation where nothing was lost: integrals of force and rate,
+    /// (raw unit · s)². `None` where no move is as long.
+    pub square: Option<Squares>,
     /// Factor of the variance of one sample's noise in it, s².
     pub noise: f64,
 }
@@ -27,7 +33,7 @@ pub struct Gap {
 impl Gap {
     /// Its error beyond noise of these densities (force, rate), (raw unit · s)²; `None` as in `square`.
     #[must_use]
-    pub fn variance(&self, density: [&Vector3<f64>; 2], step_s: f64) -> Option<[Vector3<f64>; 2]> {
+    pub fn variance(&self, density: [&Vector3<f64>; 2], step_s: f64) -> Option<Squares> {
         let square = self.square.as_ref()?;
         let excess = |k: usize| {
             let noise = density[k].component_mul(density[k]) * (self.noise / step_s);
@@ -37,140 +43,203 @@ impl Gap {
     }
 }
 
-/// The gaps of a move, relative to its own median step (timestamps of bursts are all further apart than samples).
-#[must_use]
-pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]) -> Vec<Gap> {
-    let mut lengths: Vec<f64> = steps.iter().map(|step| step.h).collect();
-    if lengths.is_empty() {
-        return Vec::new();
-    }
-    let middle = lengths.len() / 2;
-    let usual = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // A gap longer than the move itself cannot be measured.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let whole: Vec<usize> = steps
-        .iter()
-        .map(|step| ((step.h / usual).round() as usize).clamp(1, steps.len()))
-        .collect();
-    let is_gap = |k: usize| steps[k].h > GAP * usual;
-    let mut known: Vec<(Bridge, Missed)> = Vec::new();
-    let mut out = Vec::new();
-    for k in (0..steps.len()).filter(|&k| is_gap(k)) {
-        let bridge = Bridge::over(k, steps, &whole);
-        let place = known.iter().position(|(other, _)| *other == bridge);
-        let place = place.unwrap_or_else(|| {
-            let missed = bridge.measured(steps, &is_gap, usual, [force, rate]);
-            known.push((bridge, missed));
-            known.len() - 1
-        });
-        out.push(known[place].1.at(k));
-    }
-    out
-}
-
-/// Errors of the integral that the interpolation across a gap makes where no samples were lost.
-struct Missed {
-    /// Middle of each place, in steps, and its squared error of force and rate.
-    squares: Vec<(usize, [Vector3<f64>; 2])>,
-    /// Factor of the variance of one sample's noise, s².
-    noise: f64,
-}
-
-impl Missed {
-    /// At the gap that is step `k`: the mean square of the nearest places.
-    fn at(&self, k: usize) -> Gap {
-        let mut order: Vec<&(usize, [Vector3<f64>; 2])> = self.squares.iter().collect();
-        order.sort_by_key(|(middle, _)| middle.abs_diff(k));
-        order.truncate(NEAREST);
-        let n = order.len();
-        let mean = |s: usize| {
-            order
-                .iter()
-                .map(|(_, square)| square[s])
-                .sum::<Vector3<f64>>()
-                / n as f64
+/// Finds the gaps of all moves of a session.
+pub fn find_gaps(moves: &mut [Move]) {
+    let longest = moves.iter().map(|one| one.steps.len()).max().unwrap_or(0);
+    let crossed: Vec<Crossed> = moves.iter().map(|one| Crossed::of(one, longest)).collect();
+    let mut known: Vec<(Bridge, Option<Squares>)> = Vec::new();
+    let mut found: Vec<Vec<Gap>> = Vec::with_capacity(crossed.len());
+    for one in &crossed {
+        let at = |step: usize| {
+            let bridge = Bridge::over(step, one);
+            let place = known.iter().position(|(other, _)| *other == bridge);
+            let place = place.unwrap_or_else(|| {
+                let everywhere = mean(crossed.iter().flat_map(|other| other.errors(&bridge)));
+                known.push((bridge, everywhere.map(|(squares, _)| squares)));
+                known.len() - 1
+            });
+            let (bridge, session) = &known[place];
+            let near = mean(one.errors_near(bridge, step).into_iter());
+            let square = session.map(|prior| match near {
+                None => prior,
+                Some((near, n)) => [0, 1].map(|s| {
+                    (prior[s] * PRIOR_PLACES + near[s] * n as f64) / (PRIOR_PLACES + n as f64)
+                }),
+            });
+            Gap {
+                step,
+                square,
+                noise: one.usual * one.usual * bridge.noise(),
+            }
         };
-        Gap {
-            step: k,
-            square: (n >= FEWEST).then(|| [mean(0), mean(1)]),
-            noise: self.noise,
+        found.push(one.gaps().map(at).collect());
+    }
+    for (one, gaps) in moves.iter_mut().zip(found) {
+        one.gaps = gaps;
+    }
+}
+
+/// Mean of squares and their number, of any.
+fn mean(squares: impl Iterator<Item = Squares>) -> Option<(Squares, usize)> {
+    let (sum, n) = squares.fold(([Vector3::zeros(); 2], 0), |(sum, n), one| {
+        ([sum[0] + one[0], sum[1] + one[1]], n + 1)
+    });
+    (n > 0).then(|| (sum.map(|s| s / n as f64), n))
+}
+
+/// A move as its steps cross the samples.
+struct Crossed<'a> {
+    signals: [&'a [Vector3<f64>]; 2],
+    /// Samples between the steps, one more than these.
+    samples: Vec<usize>,
+    /// Sums of force and rate over the samples before each.
+    sums: [Vec<Vector3<f64>>; 2],
+    /// Length of each step, in usual ones, and at most as long as the longest move.
+    whole: Vec<usize>,
+    /// Whether a step is a line.
+    is_line: Vec<bool>,
+    /// Number of steps over lost samples before each.
+    n_lossy: Vec<usize>,
+    /// Usual step, s: the median, for timestamps of bursts are all further apart than samples.
+    usual: f64,
+}
+
+impl<'a> Crossed<'a> {
+    fn of(one: &'a Move, longest: usize) -> Self {
+        let signals = [one.force.as_slice(), one.rate.as_slice()];
+        let mut lengths: Vec<f64> = one.steps.iter().map(|step| step.h).collect();
+        let middle = lengths.len() / 2;
+        let usual = match lengths.len() {
+            0 => 1.0,
+            _ => *lengths.select_nth_unstable_by(middle, f64::total_cmp).1,
+        };
+        let mut samples = vec![one.steps.first().map_or(0, |step| step.from)];
+        samples.extend(one.steps.iter().map(|step| step.to));
+        let sums = signals.map(|signal| {
+            let mut sum = Vector3::zeros();
+            let before = samples.iter().map(|&k| {
+                let before = sum;
+                sum += signal[k];
+                before
+            });
+            before.collect()
+        });
+        let mut n_lossy = vec![0];
+        for step in &one.steps {
+            n_lossy.push(n_lossy[n_lossy.len() - 1] + usize::from(step.h > GAP * usual));
         }
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let whole = |h: f64| ((h / usual).round() as usize).clamp(1, longest + 1);
+        Self {
+            signals,
+            samples,
+            sums,
+            whole: one.steps.iter().map(|step| whole(step.h)).collect(),
+            is_line: one
+                .steps
+                .iter()
+                .map(|step| step.sample[2] == step.from)
+                .collect(),
+            n_lossy,
+            usual,
+        }
+    }
+
+    /// Steps over lost samples.
+    fn gaps(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.whole.len()).filter(|&k| self.n_lossy[k + 1] > self.n_lossy[k])
+    }
+
+    /// Squared errors of an interpolation at places a gap apart, where no samples were lost.
+    fn errors<'b>(&'b self, bridge: &'b Bridge) -> impl Iterator<Item = Squares> + 'b {
+        (0..self.samples.len())
+            .step_by(bridge.lost().len())
+            .filter_map(|first| self.error(bridge, first))
+    }
+
+    /// Those nearest to a step, from the nearest on.
+    fn errors_near(&self, bridge: &Bridge, step: usize) -> Vec<Squares> {
+        let apart = bridge.lost().len();
+        let at = step as isize - bridge.left as isize;
+        (1..=self.samples.len() / apart + 1)
+            .flat_map(|k| [at - (k * apart) as isize, at + (k * apart) as isize])
+            .filter_map(|first| self.error(bridge, usize::try_from(first).ok()?))
+            .take(NEAREST)
+            .collect()
+    }
+
+    /// Squared error of an interpolation that begins at a sample; `None` where samples were lost.
+    fn error(&self, bridge: &Bridge, first: usize) -> Option<Squares> {
+        let last = first + bridge.known[bridge.known.len() - 1];
+        if last >= self.samples.len() || self.n_lossy[last] > self.n_lossy[first] {
+            return None;
+        }
+        let lost = bridge.lost();
+        Some([0, 1].map(|s| {
+            let bridged: Vector3<f64> = bridge
+                .known
+                .iter()
+                .zip(&bridge.weights)
+                .map(|(at, &weight)| self.signals[s][self.samples[first + at]] * weight)
+                .sum();
+            let sum = self.sums[s][first + lost.end] - self.sums[s][first + lost.start];
+            let missed = (sum - bridged) * self.usual;
+            missed.component_mul(&missed)
+        }))
     }
 }
 
 /// The samples through which the rate across a gap is interpolated: two for a line, four for a cubic.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 struct Bridge {
     /// Their places, in usual steps from the first of them.
     known: Vec<usize>,
     /// Which of them the gap follows.
     left: usize,
+    /// Their weights in the sum of the lost samples.
+    weights: Vec<f64>,
 }
 
 impl Bridge {
-    /// As the integration crosses step `k`; `whole` are the lengths of all steps, in usual ones.
-    fn over(k: usize, steps: &[StepWeights], whole: &[usize]) -> Self {
-        let is_line = steps[k].sample[2] == steps[k].from;
-        let first = if is_line {
+    /// As the integration crosses step `k` of a move.
+    fn over(k: usize, one: &Crossed) -> Self {
+        let first = if one.is_line[k] {
             k
         } else {
-            k.saturating_sub(1).min(steps.len() - 3)
+            k.saturating_sub(1).min(one.whole.len() - 3)
         };
         let mut known = vec![0];
-        for length in &whole[first..first + if is_line { 1 } else { 3 }] {
+        for length in &one.whole[first..first + if one.is_line[k] { 1 } else { 3 }] {
             known.push(known.last().map_or(0, |last| last + length));
         }
-        Self {
-            known,
-            left: k - first,
-        }
+        Self::through(known, k - first)
     }
 
-    /// Weights, in steps, of all samples from the first to the last of them in the error of the integral: a lost sample
-    /// has weight one, and its interpolation is subtracted.
-    fn contrast(&self) -> Vec<f64> {
-        let n = self.known.len();
-        let mut weights = vec![0.0; self.known[n - 1] + 1];
-        for lost in self.known[self.left] + 1..self.known[self.left + 1] {
-            weights[lost] += 1.0;
-            for &at in &self.known {
-                let others = self.known.iter().filter(|&&other| other != at);
-                weights[at] -= others
+    fn through(known: Vec<usize>, left: usize) -> Self {
+        let weight = |&at: &usize| {
+            let of = |lost: usize| {
+                let others = known.iter().filter(|&&other| other != at);
+                others
                     .map(|&other| (lost as f64 - other as f64) / (at as f64 - other as f64))
-                    .product::<f64>();
-            }
+                    .product::<f64>()
+            };
+            (known[left] + 1..known[left + 1]).map(of).sum()
+        };
+        Self {
+            weights: known.iter().map(weight).collect(),
+            known,
+            left,
         }
-        weights
     }
 
-    /// Its errors where no samples were lost.
-    fn measured(
-        &self,
-        steps: &[StepWeights],
-        is_gap: &impl Fn(usize) -> bool,
-        usual: f64,
-        signals: [&[Vector3<f64>]; 2],
-    ) -> Missed {
-        let weights = self.contrast();
-        let mut squares = Vec::new();
-        for (first, window) in steps.windows(weights.len() - 1).enumerate() {
-            if (first..first + window.len()).any(is_gap) {
-                continue;
-            }
-            let samples = std::iter::once(window[0].from).chain(window.iter().map(|step| step.to));
-            let weighted: Vec<(f64, usize)> =
-                weights.iter().map(|w| w * usual).zip(samples).collect();
-            let missed = signals.map(|signal| {
-                let each = weighted.iter().map(|&(weight, k)| signal[k] * weight);
-                let sum: Vector3<f64> = each.sum();
-                sum.component_mul(&sum)
-            });
-            squares.push((first + window.len() / 2, missed));
-        }
-        Missed {
-            squares,
-            noise: usual * usual * weights.iter().map(|w| w * w).sum::<f64>(),
-        }
+    /// Places of the lost samples.
+    fn lost(&self) -> std::ops::Range<usize> {
+        self.known[self.left] + 1..self.known[self.left + 1]
+    }
+
+    /// Factor of the variance of one sample in the error of the sum.
+    fn noise(&self) -> f64 {
+        self.lost().len() as f64 + self.weights.iter().map(|w| w * w).sum::<f64>()
     }
 }
 
@@ -187,17 +256,18 @@ mod tests {
             (vec![0, 3, 4, 5], 0, 3),
             (vec![0, 4], 0, 1),
         ] {
-            let lost = known[left + 1] - known[left] - 1;
-            let weights = Bridge { known, left }.contrast();
-            let ones = weights.iter().filter(|w| (**w - 1.0).abs() < 1e-12);
-            assert!(ones.count() >= lost);
+            let bridge = Bridge::through(known, left);
+            let lost = bridge.lost();
             for power in 0..=degree {
-                let missed: f64 = weights
+                let value = |j: usize| (j as f64 - 1.0).powi(power);
+                let bridged: f64 = bridge
+                    .known
                     .iter()
-                    .enumerate()
-                    .map(|(j, w)| w * (j as f64 - 1.0).powi(power))
+                    .zip(&bridge.weights)
+                    .map(|(&at, weight)| weight * value(at))
                     .sum();
-                assert!(missed.abs() < 1e-9 * 5_f64.powi(power), "{lost} {power}");
+                let missed = lost.clone().map(value).sum::<f64>() - bridged;
+                assert!(missed.abs() < 1e-9 * 5_f64.powi(power), "{lost:?} {power}");
             }
         }
     }

@@ -14,7 +14,7 @@ mod ends;
 pub mod factor;
 pub mod fit;
 mod fixed_weights;
-mod gaps;
+pub mod gaps;
 pub mod held_out;
 pub mod hypothesis;
 mod lanes;

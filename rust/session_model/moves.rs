@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 
-use super::gaps::{Gap, gaps};
+use super::gaps::Gap;
 use crate::poisson::{RateModel, StepWeights, step_weights};
 use crate::rotation::exp_and_left_jacobian;
 
@@ -42,7 +42,7 @@ pub struct Move {
     pub unresolved: [Vector3<f64>; 4],
     /// Change of the vertical from the means of the poses before and after to its own ends.
     pub leans: [Vector3<f64>; 2],
-    /// Steps over lost samples.
+    /// Steps over lost samples, by [`super::gaps::find_gaps`].
     pub gaps: Vec<Gap>,
     /// Index of its first sample among the points of all moves.
     pub first_point: usize,
@@ -89,7 +89,7 @@ impl Move {
                 .map(|t| ((t - first) / duration_s.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
                 .collect(),
             weight,
-            gaps: gaps(&steps, &force, &rate),
+            gaps: Vec::new(),
             steps,
             duration_s,
             step_s: duration_s / (used.len().max(2) - 1) as f64,

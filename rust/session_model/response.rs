@@ -1,6 +1,8 @@
 //! Derivatives of the residuals of a move by every sample: one backward pass, and products with it
 //! (docs/model-session.md, equations 11.5-11.7).
 
+use std::f64::consts::PI;
+
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
 use super::N_SCATTER;
@@ -76,21 +78,19 @@ pub fn respond(
             let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
             velocity += turned * spread(&move_model.force_scale, of_force) * turned.transpose();
         }
-        // Where the move does not determine it, the rate of a lost sample is uniform between its neighbours: h²/12.
-        let is_unknown = missed.is_none() && step.h > GAP * noise.nominal_step_s;
-        if var_jitter > 0.0 || is_unknown {
-            let var = var_jitter
-                + if is_unknown {
-                    step.h * step.h / 12.0
-                } else {
-                    0.0
-                };
+        if missed.is_none() && step.h > GAP * noise.nominal_step_s {
+            // Nothing is known of a turn in a gap longer than any move, or of a force, but that a hand's is about |g|.
+            covariance += zeroth * zeroth.transpose() * (PI * PI / 3.0);
+            let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
+            velocity += Matrix3::identity() * (move_model.gravity * step.h).powi(2);
+        }
+        if var_jitter > 0.0 {
             let jump = zeroth * (carried.rate[step.to] - carried.rate[step.from]);
-            covariance.ger(var, &jump, &jump, 1.0);
+            covariance.ger(var_jitter, &jump, &jump, 1.0);
             let jump = carried.attitude[step.from]
                 .tr_mul(&(carried.force[step.to] - carried.force[step.from]));
             let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
-            velocity.ger(var, &jump, &jump, 1.0);
+            velocity.ger(var_jitter, &jump, &jump, 1.0);
         }
     }
     let [white, unresolved] = of_samples(one, move_model, noise, &by_rate, &by_force);

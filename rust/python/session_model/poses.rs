@@ -10,6 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::python::arrays::{matrix3, rows3, samples, stack3, vector3};
+use crate::session_model::gaps::find_gaps;
 use crate::session_model::moves::Move;
 use crate::session_model::{State, StaticMeans};
 
@@ -236,5 +237,6 @@ fn moves_of(
         ));
         first_point += stop - start;
     }
+    find_gaps(&mut out);
     Ok(out)
 }

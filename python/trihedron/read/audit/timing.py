@@ -89,7 +89,7 @@ GAP_STEPS = 1.5
 JITTER_STEPS = 0.03
 """Jitter, in steps, below which it is the clock's rounding and not reported."""
 SERIOUS_LOSS = 0.05
-"""Fraction of lost samples above which gaps make a log not to be trusted."""
+"""Fraction of samples that may be missing from a log in which no gap in time shows where."""
 MUCH_JITTER = 0.2
 """Jitter, in steps, above which it is a warning: it affects a short rotation as much as a reading's noise does."""
 
@@ -170,12 +170,9 @@ def _gap(step: FloatArray, lost: IntArray, place: Place) -> Finding:
     longest = int(gaps[np.argmax(step[gaps])])
     total = int(lost.sum())
     fraction = total / (len(step) + 1 + total)
-    # One gap, however long, is a pause of the logger: a link that loses samples has others.
-    others = total - int(lost[longest])
     worst = sorted(gaps[np.argsort(step[gaps])[::-1][:3]].tolist())
     return Finding.of(
         "time-gap",
-        severity=Severity.SERIOUS if others > SERIOUS_LOSS * (len(step) + 1 + others) else Severity.WARNING,
         count=len(gaps),
         lost_samples=total,
         fraction=fraction,

@@ -2,7 +2,7 @@
 
 from trihedron.report.findings.entry import NOTE, SERIOUS, WARNING, Words
 
-_INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
+_INTEGRATED = "Turns that fall into a gap are interpolated and weigh less; repeat them."
 
 _TIMESTAMPS = {
     ("time-jitter", "", NOTE): Words(
