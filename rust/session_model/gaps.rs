@@ -45,6 +45,9 @@ impl Gap {
 
 /// Finds the gaps of all moves of a session.
 pub fn find_gaps(moves: &mut [Move]) {
+    if !moves.iter().any(has_gaps) {
+        return;
+    }
     let longest = moves.iter().map(|one| one.steps.len()).max().unwrap_or(0);
     let crossed: Vec<Crossed> = moves.iter().map(|one| Crossed::of(one, longest)).collect();
     let mut known: Vec<(Bridge, Option<Squares>)> = Vec::new();
@@ -79,6 +82,21 @@ pub fn find_gaps(moves: &mut [Move]) {
     }
 }
 
+/// Usual step, s: the median, for timestamps of bursts are all further apart than samples.
+fn usual_step(one: &Move) -> f64 {
+    let mut lengths: Vec<f64> = one.steps.iter().map(|step| step.h).collect();
+    let middle = lengths.len() / 2;
+    match lengths.len() {
+        0 => 1.0,
+        _ => *lengths.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
+}
+
+fn has_gaps(one: &Move) -> bool {
+    let usual = usual_step(one);
+    one.steps.iter().any(|step| step.h > GAP * usual)
+}
+
 /// Mean of squares and their number, of any.
 fn mean(squares: impl Iterator<Item = Squares>) -> Option<(Squares, usize)> {
     let (sum, n) = squares.fold(([Vector3::zeros(); 2], 0), |(sum, n), one| {
@@ -100,19 +118,14 @@ struct Crossed<'a> {
     is_line: Vec<bool>,
     /// Number of steps over lost samples before each.
     n_lossy: Vec<usize>,
-    /// Usual step, s: the median, for timestamps of bursts are all further apart than samples.
+    /// Usual step, s.
     usual: f64,
 }
 
 impl<'a> Crossed<'a> {
     fn of(one: &'a Move, longest: usize) -> Self {
         let signals = [one.force.as_slice(), one.rate.as_slice()];
-        let mut lengths: Vec<f64> = one.steps.iter().map(|step| step.h).collect();
-        let middle = lengths.len() / 2;
-        let usual = match lengths.len() {
-            0 => 1.0,
-            _ => *lengths.select_nth_unstable_by(middle, f64::total_cmp).1,
-        };
+        let usual = usual_step(one);
         let mut samples = vec![one.steps.first().map_or(0, |step| step.from)];
         samples.extend(one.steps.iter().map(|step| step.to));
         let sums = signals.map(|signal| {
@@ -160,10 +173,11 @@ impl<'a> Crossed<'a> {
     /// Those nearest to a step, from the nearest on.
     fn errors_near(&self, bridge: &Bridge, step: usize) -> Vec<Squares> {
         let apart = bridge.lost().len();
-        let at = step as isize - bridge.left as isize;
+        let at = step - bridge.left;
         (1..=self.samples.len() / apart + 1)
-            .flat_map(|k| [at - (k * apart) as isize, at + (k * apart) as isize])
-            .filter_map(|first| self.error(bridge, usize::try_from(first).ok()?))
+            .flat_map(|k| [at.checked_sub(k * apart), Some(at + k * apart)])
+            .flatten()
+            .filter_map(|first| self.error(bridge, first))
             .take(NEAREST)
             .collect()
     }
