@@ -15,7 +15,7 @@ from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import _folds, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.estimate.attitude import integrate_rate
-from trihedron.estimate.session.observed import _left_by_earth, turned_with_earth
+from trihedron.estimate.session.earth import left_in_move, turned_with_earth
 from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_up
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
@@ -307,6 +307,6 @@ def test_the_earth_rate_that_a_slow_move_turns_away_from_a_linear_bias_is_in_the
     read = np.einsum("nij,ki->knj", attitude, earth)
     linear = read[:, :1] + (time_s / 30.0)[:, None] * (read[:, -1:] - read[:, :1])
     left = np.einsum("nij,knj->kni", attitude, read - linear).sum(axis=1) * 0.05
-    variance = _left_by_earth(EARTH_RATE_RAD_S**2 / 3.0 * np.eye(3), time_s, rate)
+    variance = left_in_move(EARTH_RATE_RAD_S**2 / 3.0 * np.eye(3), time_s, rate)
     # Of 2000 times three the mean square is certain to 2 %.
     assert np.mean(left**2) == pytest.approx(variance, rel=0.1)

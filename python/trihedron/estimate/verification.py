@@ -12,6 +12,7 @@ from trihedron.errors import InputError
 from trihedron.estimate.gravity_error import norm_error
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import carried_by, without_g_sensitivity
+from trihedron.estimate.session.earth import turned_with_earth
 from trihedron.estimate.verified_parameters import (
     common_factor,
     imprecision_findings,
@@ -32,6 +33,7 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.verification import JudgedParameter
+from trihedron.transforms import directions_of
 
 FAR_BEYOND = 10.0
 """Ratio of an error to noise and stated uncertainty above which the calibration is not, or no longer, this sensor's.
@@ -70,6 +72,8 @@ def verify_calibration(
     rest_sigma = expected_change(calibration, recording, segments, rest_noise)
     if gyroscope is not None and len(rest):
         rest = rest - earth_rate_up(recording.latitude_deg) / gravity_m_s2 * force
+        earth = turned_with_earth(recording.latitude_deg, directions_of(force))
+        rest_sigma = np.sqrt(rest_sigma**2 + np.einsum("nii->ni", earth))
         if any(move.stop - move.start >= 2 for move in segments.moves):
             measured = without_g_sensitivity(measure_moves(recording, segments, accelerometer), own)
             moves = _carried(calibration, gyroscope, measured, segments)

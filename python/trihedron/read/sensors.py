@@ -1,7 +1,6 @@
 """The sensors of one table on the table's clock, with units and order of samples."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,15 +8,15 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.probability import bdtrc
-from trihedron.read.clock.base import PART, Clock, build_clock
-from trihedron.read.clock.rate import mean_rate_hz, steps_of, usual_step
+from trihedron.read.clock.base import Clock, build_clock
+from trihedron.read.clock.rate import mean_rate_hz, usual_step
 from trihedron.read.clock.settle import settle_clock
 from trihedron.read.clock.unit import TICKS, Witness, counts_rows
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import is_rate
+from trihedron.read.repeated_rows import without_repeated_rows
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Options, Table
 from trihedron.read.time_column import reject_unread_time, summed_steps, with_arrivals
@@ -26,8 +25,6 @@ from trihedron.records.sampling import UNJUDGED
 from trihedron.records.words import Words, words
 
 ASSUMED_RATE_HZ = 100.0
-FEWEST_ROWS = 2
-"""Smallest number of rows of a recording; rows are not removed as copies if fewer would remain."""
 WITNESS_ROWS = 200_000
 LONGEST_MTI_STEP = 5000.0
 """Steps of 100 µs between samples at 2 Hz, below an MTi's usual rates; a DOT's samples are at least 8333 µs apart."""
@@ -125,7 +122,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     if chosen.time is None:
         reject_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)
-    clock = _without_copies(table, chosen, clock, findings)
+    clock = without_repeated_rows(table, chosen, clock, findings)
     accelerometer = None if sensor == "gyroscope" else _triad(table, chosen.accelerometer, clock.rows)
     gyroscope = None if sensor == "accelerometer" else _triad(table, chosen.gyroscope, clock.rows)
     if accelerometer is None and gyroscope is None:
@@ -157,31 +154,6 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         rows_in_file=table.n_in_file,
         rows_read=len(clock.time_s),
     )
-
-
-def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
-    """The clock without rows that are no samples: copies of the previous row, and readings read again before the
-    sensor measured anew, at the time when they were read first."""
-    rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
-    readings = [table.columns[column] for column in chosen.readings]
-    for is_copy in (True, False) if chosen.time is not None else ():
-        again = _copied_rows(readings, clock.time_s, rows) if is_copy else _rows_read_again(readings, rows)
-        if not len(again) or len(rows) - len(again) < FEWEST_ROWS:
-            continue
-        findings.append(
-            Finding.of(
-                "repeated-rows",
-                "copies" if is_copy else "read-again",
-                rows_left_out=len(again),
-                share=len(again) / len(rows),
-                where=table.place(int(rows[again[0]])),
-                count=len(again),
-                row=rows[again[0]],
-            )
-        )
-        rows = np.delete(rows, again)
-        clock = Clock(np.delete(clock.time_s, again), clock.start_s, rows, clock.findings)
-    return clock
 
 
 def _witness(table: Table, chosen: Columns) -> Witness:
@@ -260,7 +232,7 @@ def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str
     return unit
 
 
-# Repeated readings: channels that are constant throughout, and rows that a log contains twice.
+# Channels that are constant throughout.
 
 TOO_FEW_TO_JUDGE = 20
 """Number of rows below which a working channel may be constant."""
@@ -285,75 +257,3 @@ def _reject_constant(table: Table, name: str, triad: FloatArray, where: tuple[in
                 f"{table.path}: column {table.label(column)} of the {name} is {finite[0]:.6g} in all {len(finite)} "
                 f"rows from {table.place(0)} on: a dead channel, or the wrong column; name the columns with --columns."
             )
-
-
-BY_CHANCE = 1e-3
-"""Probability below which equal readings under equal timestamps are copies: one log of a thousand is wrong."""
-WINDOW = 64
-"""Rows over which axes repeat their readings independently; over longer ones they all do so in poses."""
-
-
-RARE = 0.01
-"""Share of samples that may equal the previous one by chance: excluded with those that were read again, they shift a
-mean by a hundredth of an LSB at most."""
-FARTHER = 8
-"""Distances, beyond the longest run of equal rows, at which rows are compared."""
-
-
-def _copied_rows(
-    columns: Sequence[FloatArray], time_s: FloatArray, rows: npt.NDArray[np.signedinteger]
-) -> npt.NDArray[np.signedinteger]:
-    """Samples (k,) that repeat timestamp and readings of the previous sample, if more do so than by chance.
-
-    ``columns`` are the readings (rows of the table), ``rows`` (n,) the table row of each sample. Samples timestamped on
-    arrival share timestamps, and coarse codes or a sensor slower than the log repeat readings: how often, rows with
-    timestamps of their own show, by all axes together and by each.
-    """
-    if not steps_of(time_s).same:
-        return rows[:0]
-    is_same = np.diff(time_s) == 0
-    again, apart = np.flatnonzero(is_same) + 1, np.flatnonzero(~is_same)[:PART] + 1
-    copies = again[_repeats(columns, rows, again).all(axis=0)]
-    repeats = _repeats(columns, rows, apart)
-    chance = max(_independent(repeats), float(repeats.all(axis=0).mean()))
-    return copies if _are_more(len(copies), len(again), chance) else again[:0]
-
-
-def _rows_read_again(
-    columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger]
-) -> npt.NDArray[np.signedinteger]:
-    """Samples (k,) whose readings all repeat the previous sample's, if more do so than by chance and chance is rare."""
-    first = np.arange(1, min(len(rows), PART))
-    repeats = _repeats(columns, rows, first)
-    is_again = repeats.all(axis=0)
-    if len(repeats) < 4 or not _are_more(int(is_again.sum()), len(first), _independent(repeats)):
-        return rows[:0]
-    longest = int(np.diff(np.flatnonzero(np.r_[True, ~is_again, True])).max())
-    farther = [k for k in range(longest, longest + FARTHER) if k < len(first)]
-    if max((_repeats(columns, rows, first[k:], k).all(axis=0).mean() for k in farther), default=1.0) > RARE:
-        return rows[:0]
-    every = np.arange(1, len(rows))
-    return every[_repeats(columns, rows, every).all(axis=0)]
-
-
-def _independent(repeats: npt.NDArray[np.bool_]) -> float:
-    """Share of samples in which axes that repeat independently, as often as each does, would repeat together."""
-    width = max(min(WINDOW, repeats.shape[1]), 1)
-    whole = repeats[:, : repeats.shape[1] // width * width].reshape(len(repeats), -1, width)
-    return float(whole.mean(axis=2).prod(axis=0).mean()) if whole.size else 1.0
-
-
-def _are_more(count: int, n: int, chance: float) -> bool:
-    """Whether ``count`` of ``n`` are more than by chance, and at twice its odds."""
-    return count > 2.0 * chance / (1.0 + chance) * n and bool(bdtrc(count - 1, n, chance) < BY_CHANCE)
-
-
-def _repeats(
-    columns: Sequence[FloatArray],
-    rows: npt.NDArray[np.signedinteger],
-    at: npt.NDArray[np.signedinteger],
-    distance: int = 1,
-) -> npt.NDArray[np.bool_]:
-    """(1 + axes, k) whether readings of the samples ``at`` (k,) equal those ``distance`` before; row 0 is true."""
-    equal = [values[rows[at]] == values[rows[at - distance]] for values in columns if len(values)]
-    return np.array([np.ones(len(at), dtype=bool), *equal])

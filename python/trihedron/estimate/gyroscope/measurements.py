@@ -42,7 +42,7 @@ class MoveMeasurements:
     of its bias. ``bias_read``, ``var_bias_read`` (n, 3) are the biases from each pose alone, ``var_reading_noise``
     (n, 3) the variance of the accelerometer's pose means by noise alone, ``reading_variance`` (samples, 3) that of gyro
     readings which are bridged or rounded, ``shared_errors`` (samples, 3, k) are k errors of one σ each that all moves
-    share.
+    share; ``latitude_deg`` is the place's, if it is known.
     """
 
     links: IntArray
@@ -69,6 +69,7 @@ class MoveMeasurements:
     quantum: FloatArray
     is_hidden: FloatArray
     shared_errors: FloatArray
+    latitude_deg: float | None
 
     @property
     def is_lost(self) -> BoolArray:
@@ -182,6 +183,7 @@ def measure_moves(recording: Recording, segments: Segments, accelerometer: Senso
         quantum=quantum,
         is_hidden=hidden,
         shared_errors=shared,
+        latitude_deg=recording.latitude_deg,
     )
 
 

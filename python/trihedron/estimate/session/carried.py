@@ -14,6 +14,7 @@ from trihedron import _core
 from trihedron.arrays import AXES, FloatArray, IntArray
 from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.session.earth import left_by_earth, turned_with_earth
 from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records import Calibration, FitQuality, Segments
@@ -143,10 +144,10 @@ def move_quality(
 class Carried:
     """Tilt errors after moves: ``residual`` (m, 3) m/s² with its ``covariance`` (m, 3, 3), ``angle_deg`` (m,).
 
-    ``floor2`` (m,) is the variance across the vertical by poses and samples, (m/s²)²; ``noise`` (m, 3, 3) the
-    covariance by their noise alone, without what the accelerometer leaves unexplained in the poses; ``up`` (m, 3) the
-    unit vertical after a move, ``wrt_scale`` (m, 3, 9) and ``wrt_accelerometer`` (m, 3, 12) the derivatives of the
-    residual by the gyro's S row by row, and by S and b of the accelerometer.
+    ``floor2`` (m,) is the variance across the vertical by poses, samples and the Earth's rotation, (m/s²)²; ``noise``
+    (m, 3, 3) the covariance by noise and Earth alone, without what the accelerometer leaves unexplained in the poses;
+    ``up`` (m, 3) the unit vertical after a move, ``wrt_scale`` (m, 3, 9) and ``wrt_accelerometer`` (m, 3, 12) the
+    derivatives of the residual by the gyro's S row by row, and by S and b of the accelerometer.
     """
 
     residual: FloatArray
@@ -224,6 +225,9 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
             measured.time_s, measured.rate, measured.edges[at], np.ascontiguousarray(anchors_s[at]),
             np.ascontiguousarray(one.S_w), bias[before[at]], bias[after[at]], 3, noise,
         )  # fmt: skip
+        earth = turned_with_earth(measured.latitude_deg, directions_of(measured.reading @ one.S_a.T + one.b_a))
+        spans = [(int(before[k]), (int(measured.edges[k, 0]), int(measured.edges[k, 1]))) for k in at]
+        cov_rate[at] += left_by_earth(measured, earth, one.S_w, spans)[:, None, None] * np.eye(3)
     read = measured.reading[before], measured.reading[after]
     start, end = (np.einsum("mij,mj->mi", S_a, one) + b_a for one in read)
     by_S = rotation[..., None] * read[0][:, None, None, :] - np.eye(3)[..., None] * read[1][:, None, None, :]

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
-from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.gravity import earth_rate_up, unknown_earth_rate
+from trihedron.estimate.session.earth import left_by_earth, turned_with_earth
+from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
@@ -128,9 +128,9 @@ def arranged(
         pose_rate, own["pose_rate_sigma"], unresolved = support.applied(*seen, near[2])
         leans = support.leans
     inverse, earth = np.linalg.inv(near[2]), turned_with_earth(recording.latitude_deg, up)
-    of_poses = np.einsum("ai,nij,aj->na", inverse, earth, inverse)
-    own["pose_rate_sigma"] = np.sqrt(own["pose_rate_sigma"] ** 2 + of_poses)
-    unresolved[:, 3] += np.outer(_of_moves(earth, measured, ranges, before, near[2]), np.sum(inverse**2, axis=1))
+    own["pose_rate_sigma"] = np.sqrt(own["pose_rate_sigma"] ** 2 + np.einsum("ai,nij,aj->na", inverse, earth, inverse))
+    of_moves = left_by_earth(measured, earth, near[2], list(zip(before, ranges, strict=True)))
+    unresolved[:, 3] += np.outer(of_moves, np.sum(inverse**2, axis=1))
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
         time_s=measured.time_s,
@@ -154,33 +154,6 @@ def arranged(
         effect_force=np.concatenate([measured.reading, readings[kept]]) - force_origin,
         n_hidden=len(coarse), earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
-
-
-def turned_with_earth(latitude_deg: float | None, up: FloatArray) -> FloatArray:
-    """Covariances (n, 3, 3) [rad²/s²] of what is not known of the Earth's rotation in poses of unknown heading with
-    directions ``up`` (n, 3)."""
-    across, along = np.square(unknown_earth_rate(latitude_deg))
-    return np.asarray(across * np.eye(3) + (along - across) * up[:, :, None] * up[:, None, :])
-
-
-def _of_moves(
-    earth: FloatArray, measured: MoveMeasurements, ranges: list[tuple[int, int]], before: list[int], S: FloatArray
-) -> list[float]:
-    """:func:`_left_by_earth` of every move, by the rates that are read."""
-    return [
-        _left_by_earth(earth[k], measured.time_s[a:b], (measured.rate[a:b] - measured.bias_read[k]) @ S.T)
-        for (a, b), k in zip(ranges, before, strict=True)
-    ]
-
-
-def _left_by_earth(earth: FloatArray, time_s: FloatArray, rate: FloatArray) -> float:
-    """Variance [rad²] along an axis that the Earth's rotation, of covariance ``earth`` (3, 3) in the pose before, adds
-    to the integral of a move's ``rate`` (n, 3), beside biases that are linear between its poses and contain it."""
-    attitude = integrate_rate(time_s, rate)
-    share = ((time_s - time_s[0]) / max(time_s[-1] - time_s[0], TINY))[:, None, None]
-    between = (1.0 - share) * np.eye(3) + share * attitude[-1].T
-    left = np.trapezoid(np.eye(3) - attitude @ between, time_s, axis=0)
-    return float(np.trace(left @ earth @ left.T)) / 3.0
 
 
 def _effects(
