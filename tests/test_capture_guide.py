@@ -1,12 +1,8 @@
-"""The guide without a screen, led by a simulated hand; its screens as text; its page in a real headless browser."""
+"""The guide without a screen, led by a simulated hand; its screens as text."""
 
-import http.client
-import json
 import re
-import shutil
 from dataclasses import replace
 from itertools import pairwise
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -16,7 +12,6 @@ from trihedron.api.guiding import conclude, examine, part_of
 from trihedron.api.replaying import readings_of, steps
 from trihedron.capture.guide import Guide, Stillness
 from trihedron.cli import main
-from trihedron.cli.page import Page
 from trihedron.cli.screen import as_text
 from trihedron.files.log import write_recording
 from trihedron.records.guiding import Accuracy, Phase
@@ -26,7 +21,6 @@ from trihedron.simulate.motion.steps import Motion, MoveTo, Pose
 from trihedron.simulate.noise import stream
 
 ACCURACY = Accuracy.parse("accel 0.1 %, gyro 0.2 %")
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 class FollowingHand:
@@ -181,64 +175,3 @@ def test_a_log_is_replayed_through_the_guide_to_a_calibration(led, tmp_path, cap
     assert "Accuracy reached. 3 more poses to check it." in " ".join(said.split())
     assert "Verification" in said
     assert trihedron.read_calibration(calibration).is_trustworthy
-
-
-def get(page, path, cookie="", host=None):
-    """(status, headers, first line of the body) of one request."""
-    address = urlsplit(page.address)
-    connection = http.client.HTTPConnection("127.0.0.1", address.port, timeout=5)
-    connection.putrequest("GET", path, skip_host=True)
-    connection.putheader("Host", host or address.netloc)
-    if cookie:
-        connection.putheader("Cookie", cookie)
-    connection.endheaders()
-    with connection.getresponse() as response:
-        found = response.status, response.headers, response.readline().decode()
-    connection.close()
-    return found
-
-
-def test_the_page_opens_once_with_its_token_and_only_for_its_own_address(led):
-    page = Page()
-    try:
-        assert urlsplit(page.address).hostname == "127.0.0.1"
-        query = f"/?{urlsplit(page.address).query}"
-        assert get(page, "/")[0] == 403
-        assert get(page, "/events")[0] == 403
-        assert get(page, "/?token=guess")[0] == 403
-        # A name on the internet that points here (DNS rebinding) gets nothing, and does not use the token up.
-        assert get(page, query, host="evil.example")[0] == 403
-        status, headers, _ = get(page, query)
-        assert status == 200
-        assert "default-src 'none'" in headers["Content-Security-Policy"]
-        cookie = headers["Set-Cookie"].split(";")[0]
-        assert get(page, query)[0] == 403
-        assert get(page, "/", cookie)[0] == 200
-        assert get(page, "/etc/passwd", cookie)[0] == 404
-        page.show(led[1][-1])
-        told = json.loads(get(page, "/events", cookie)[2].removeprefix("data: "))
-        assert told["instruction"] == "Done."
-    finally:
-        page.close()
-
-
-@pytest.mark.skipif(not CHROMIUM, reason="no Chromium or Chrome on this machine to look at the page with")
-def test_a_real_browser_shows_the_guide(led):
-    sync_playwright = pytest.importorskip("playwright.sync_api").sync_playwright
-    view = next(v for v in led[1] if v.phase is Phase.MOVE and v.n_poses > 9)
-    page = Page()
-    page.show(view, lost=3)
-    try:
-        with sync_playwright() as tool:
-            browser = tool.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            screen, faults = browser.new_page(viewport={"width": 390, "height": 844}), []
-            screen.on("pageerror", lambda error: faults.append(str(error)))
-            screen.goto(page.address)
-            # The view comes by the stream of events, after the page.
-            screen.locator("#big", has_text=re.compile(f"^{view.n_poses}")).wait_for()
-            assert faults == []
-            table, foot = (screen.query_selector(part).bounding_box() for part in ("table", "footer"))
-            assert foot["y"] >= table["y"] + table["height"] - 1.0, "on a phone nothing covers the table"
-            browser.close()
-    finally:
-        page.close()

@@ -35,9 +35,9 @@ def test_calibrate_prints_a_report_and_writes_what_was_asked_for(session, tmp_pa
     assert np.shape(document["accelerometer"]["S"]) == (3, 3)
     assert document["gravity_m_s2"] == 9.80665
     text = page.read_text()
-    # Residuals by pose and before calibration, on the sphere, poses, moves, signals.
+    # Residuals by pose and before calibration, poses, moves, signals.
     # All drawn as they are read: no pictures of pictures.
-    assert text.count("<figure id=") == 5
+    assert text.count("<figure id=") == 4
     assert "data:image" not in text
     # Self-contained: nothing is fetched; its one script is inside it.
     assert "http" not in text.replace("http-equiv", "")

@@ -21,7 +21,7 @@ from trihedron.records.domains import DOMAINS
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_pictures import uncalibrated_error
-from trihedron.report.chart import Bars, Chart, Level, Line, Note, Panel, Points, Scale, Span, Sphere
+from trihedron.report.chart import Bars, Chart, Disc, Level, Line, Note, Panel, Points, Scale, Span
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import _path
@@ -47,8 +47,7 @@ def chart():
         Bars(x, y, 0.5, ["a", "b", "c"], "bars"), Level(y=0.0), Note(1.0, 0.0, "note"),
     )  # fmt: skip
     panel = Panel(Scale("x [s]", "s", limits=(0.0, 4.0)), Scale("y", names=("one", "two")), marks)
-    sphere = Sphere("errors", np.eye(3), x, 3.0, ["a", "b", "c"])
-    return Chart((panel, sphere))
+    return Chart((panel, Disc("up", ((0.1, -0.2, "1", "pose 1", "taken"),))))
 
 
 def document():

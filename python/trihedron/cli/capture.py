@@ -32,8 +32,6 @@ OPTIONS = {
     "time_unit": ("UNIT", "Unit of the board's time: s, ms, us or ns."),
     "wait": typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged."),
     "guide": "Lead through a calibration on a live screen.",
-    "browser": "The guide as a page in the browser.",
-    "no_open": "With --browser: print the link, open nothing.",
     "accuracy": ("TEXT", 'Of the guide: "accel 0.05 %, gyro 0.1 %".'),
     "calibration": ("FILE", "Of the guide: calibration to write at the end."),
     "bell": "Of the guide: ring when a pose is taken.",
@@ -54,8 +52,6 @@ def capture(
     time_unit: str | None = None,
     wait: float = 60.0,
     guide: bool = False,
-    browser: bool = False,
-    no_open: bool = False,
     accuracy: str = ACCURACY,
     calibration: Path | None = None,
     bell: bool = False,
@@ -80,7 +76,7 @@ def capture(
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
     _say(f"{source.name}: {found.protocol}. Recording to {output}; Ctrl-C stops.")
     recorder = recorder_of(source, found, output, overwrite=force, rate_hz=rate, wait_for_return_s=wait)
-    if not (guide or browser):
+    if not guide:
         record(recorder, output, seconds)
         return
     from trihedron.api.reading import read
@@ -88,16 +84,7 @@ def capture(
     from trihedron.cli.run import note_log
 
     with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
-        made = run_guided(
-            recorder,
-            output,
-            accuracy,
-            place.gravity_m_s2,
-            browser=browser,
-            bell=bell,
-            open_browser=not no_open,
-            seconds=seconds,
-        )
+        made = run_guided(recorder, output, accuracy, place.gravity_m_s2, bell=bell, seconds=seconds)
     conclude(recorder, output, recorder.count.saved, is_ended_well=made.is_done)
     note_log(LogSource(log=output))
     finish(read(output), made.cut_s, place, calibration, force=force)

@@ -1,4 +1,4 @@
-"""``trihedron guide`` and ``trihedron capture --guide``: the guide's loop, with a screen, a page or neither."""
+"""``trihedron guide`` and ``trihedron capture --guide``: the guide's loop, with a screen or without."""
 
 from __future__ import annotations
 
@@ -120,9 +120,7 @@ def run_guided(
     accuracy: str,
     gravity_m_s2: float,
     *,
-    browser: bool,
     bell: bool,
-    open_browser: bool,
     seconds: float | None,
 ) -> Any:
     """Capture with the guide; returns the guide, which has the start of the verification."""
@@ -141,7 +139,7 @@ def run_guided(
     made = Guide(wanted, look)
     columns: list[int] = []
     started = time.monotonic()
-    with _Shown(recorder, started, browser=browser, bell=bell, open_browser=open_browser) as show:
+    with _Shown(recorder, started, bell=bell) as show:
         for block in recorder:
             if not columns:
                 columns = sensor_columns(block.columns)
@@ -152,26 +150,15 @@ def run_guided(
 
 
 class _Shown:
-    """Display of the guide: a screen on a terminal, a line per change elsewhere; optionally the page."""
+    """Display of the guide: a screen on a terminal, a line per change elsewhere."""
 
-    def __init__(self, recorder: Recorder, started: float, *, browser: bool, bell: bool, open_browser: bool) -> None:
-        self._recorder, self._started = recorder, started
-        self._browser, self._bell, self._open = browser, bell, open_browser
+    def __init__(self, recorder: Recorder, started: float, *, bell: bool) -> None:
+        self._recorder, self._started, self._bell = recorder, started, bell
         self._live: Any = None
-        self._page: Any = None
         self._events, self._drawn_s, self._said = 0, 0.0, ""
 
     def __enter__(self) -> Show:
-        if self._browser:
-            from trihedron.cli.page import Page
-
-            self._page = Page()
-            typer.echo(f"The guide is at {self._page.address} (this computer only).", err=True)
-            if self._open:
-                import webbrowser
-
-                webbrowser.open(self._page.address)
-        elif sys.stderr.isatty():
+        if sys.stderr.isatty():
             from rich.console import Console
             from rich.live import Live
 
@@ -182,8 +169,6 @@ class _Shown:
     def __exit__(self, *_: object) -> None:
         if self._live is not None:
             self._live.stop()
-        if self._page is not None:
-            self._page.close()
 
     def _show(self, view: GuideView) -> None:
         rings = view.n_events > self._events
@@ -194,15 +179,12 @@ class _Shown:
         if now - self._drawn_s < 0.1 and not rings:
             return
         self._drawn_s = now
-        lost = self._recorder.count.lost
-        if self._page is not None:
-            self._page.show(view, lost)
         if self._live is not None:
             from trihedron.cli.screen import screen
 
-            size = self._live.console.size
+            size, lost = self._live.console.size, self._recorder.count.lost
             shown = screen(view, min(size.width, MOST_COLUMNS), size.height, lost=lost, seconds=now - self._started)
             self._live.update(shown, refresh=True)
-        elif rings or (view.instruction.split(":")[0] != self._said and self._page is None):
+        elif rings or view.instruction.split(":")[0] != self._said:
             self._said = view.instruction.split(":")[0]
             typer.echo(f"{view.time_s:7.1f} s  {view.instruction}", err=True)

@@ -1,4 +1,4 @@
-"""Charts of a calibration: residuals with their limits, the sphere of poses, moves, correlations."""
+"""Charts of a calibration: residuals with their limits, directions of poses, moves, correlations."""
 
 import math
 import re
@@ -114,8 +114,8 @@ def move_noise_deg(quality: FitQuality) -> FloatArray:
     return np.asarray(degrees_from_radians(1.0) * np.linalg.norm(quality.sigma, axis=1) / 9.8)
 
 
-def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
-    """Directions of "up", with the most useful next poses."""
+def poses_chart(sensor: SensorCalibration, means: FloatArray, error: FloatArray | None) -> Chart:
+    """Directions of "up" with the gravity ``error`` (n,) of each pose, and the most useful next poses."""
     up = directions_of(means @ sensor.S.T + sensor.b)
     advice = sensor.observability.advice if sensor.observability is not None else ()
     wanted = [(words, direction) for words in advice if (direction := direction_in_words(words)) is not None]
@@ -130,7 +130,8 @@ def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
                 # Overlapping marks hide each other's numbers: only the first of nearly equal poses has one.
                 is_covered = any(name and math.hypot(x - a, y - b) < MARK for a, b, name, *_ in points)
                 label = "" if is_covered or len(up) > MOST_NUMBERED else str(k + 1)
-                points.append((x, y, label, f"pose {k + 1}: up is {words}", "taken"))
+                tip = f"pose {k + 1}" if error is None else said(f"pose {k + 1}", mm_s2(error)[k], "mm/s²")
+                points.append((x, y, label, f"{tip}, up {words}", "taken"))
         # Numbered marks last: the others would cover their numbers.
         points.sort(key=lambda point: point[2] != "")
         for n, (words, d) in enumerate(wanted):

@@ -1,4 +1,4 @@
-"""The pictures of a calibration: before and after, residuals by pose and orientation."""
+"""The pictures of a calibration: before and after, residuals by pose, directions of the poses."""
 
 from dataclasses import replace
 from functools import partial
@@ -6,21 +6,14 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import FloatArray, rms_of
-from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records import Calibration, FitQuality, Recording, Segments
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
-from trihedron.report.calibration_charts import (
-    mm_s2,
-    move_chart,
-    residual_chart,
-    sphere_chart,
-)
-from trihedron.report.calibration_fit import direction
-from trihedron.report.chart import Chart, Level, Mark, Panel, Points, Scale, Sphere
+from trihedron.report.calibration_charts import mm_s2, move_chart, poses_chart, residual_chart
+from trihedron.report.chart import Chart, Level, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import said
 from trihedron.report.numbers import how_many, plain_number
 from trihedron.report.segments import pose_lines, signals_picture
-from trihedron.transforms import directions_of
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 
@@ -115,12 +108,11 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
     quality = calibration.accelerometer.quality
     means = None if segments is None else segments.accelerometer_mean
     if means is not None:
-        if quality is not None and len(means) == len(quality.residual):
-            blocks.append(orientation_picture(calibration.accelerometer, means, _unseen(quality)))
+        error = _unseen(quality) if quality is not None and len(means) == len(quality.residual) else None
         caption = "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
         caption += "not recorded; a number is a pose (the first of coinciding ones); triangles are the most useful "
         caption += "next poses, in that order."
-        blocks.append(Picture("poses", caption, partial(sphere_chart, calibration.accelerometer, means)))
+        blocks.append(Picture("poses", caption, partial(poses_chart, calibration.accelerometer, means, error)))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
         caption = f"Tilt error after every rotation, {IN_SAMPLE} and {HELD_OUT}."
@@ -128,23 +120,3 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
     if segments is not None and recording is not None:
         blocks.append(signals_picture(recording, segments))
     return blocks
-
-
-def orientation_picture(sensor: SensorCalibration, means: FloatArray, error: FloatArray) -> Picture:
-    """Gravity errors (n,) at their directions of "up", by raw mean readings (n, 3)."""
-    caption = "Gravity error by the direction of 'up' in the body frame: dots grow with the error, orange too long, "
-    caption += "blue too short, pale behind. One colour on one side: an effect of orientation that the model lacks. "
-    caption += "Drag to turn."
-    return Picture("orientation", caption, partial(orientation_chart, sensor, means, error))
-
-
-def orientation_chart(sensor: SensorCalibration, means: FloatArray, error: FloatArray) -> Chart:
-    """Gravity error (n,) of every pose at its direction of "up"; ``means`` (n, 3) raw readings."""
-    force, values = means @ sensor.S.T + sensor.b, mm_s2(error)
-    limit = float(np.nanmax(np.abs(values), initial=0.0))
-    tips = [
-        f"{said(f'pose {k}', v, 'mm/s²')}, up {direction(f)}"
-        for k, (v, f) in enumerate(zip(values, force, strict=True), 1)
-    ]
-    title = f"gravity error by orientation, largest {plain_number(limit)} mm/s²"
-    return Chart((Sphere(title, directions_of(force), values, limit, tips),), legend=False)

@@ -147,26 +147,11 @@ class Disc:
     points: tuple[tuple[float, float, str, str, Literal["taken", "wanted"]], ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Sphere:
-    """Values by direction, on a rotatable sphere about the body; ``limit`` is the value of a full-sized dot.
-
-    ``directions`` (n, 3) unit vectors in the body frame, ``values`` (n,); negative ones have the colour c1, positive
-    ones the accent colour.
-    """
-
-    title: str
-    directions: FloatArray
-    values: FloatArray
-    limit: float
-    said: Sequence[str]
-
-
 @dataclass(frozen=True)
 class Chart:
     """Panels under one legend. ``columns`` side by side on a wide page; linked panels zoom along ``x`` together."""
 
-    panels: tuple[Panel | Disc | Sphere, ...]
+    panels: tuple[Panel | Disc, ...]
     columns: int = 1
     is_linked: bool = False
     legend: bool = True

@@ -1,12 +1,9 @@
-"""Panels without axes: directions on a disc or a rotatable sphere."""
+"""Panels without axes: directions on a disc."""
 
-import json
 import math
 from html import escape
 
-import numpy as np
-
-from trihedron.report.chart import Disc, Sphere
+from trihedron.report.chart import Disc
 
 _RADIUS = 100.0
 
@@ -43,19 +40,3 @@ def equal_area(up: tuple[float, float, float]) -> tuple[float, float]:
     """Lambert's azimuthal projection of a unit vector about the nearest pole; the equator has radius one."""
     factor = 1.0 / math.sqrt(1.0 + abs(up[2]))
     return up[0] * factor, up[1] * factor
-
-
-def drawn_sphere(sphere: Sphere, caption: str) -> str:
-    """A canvas that the page's script draws and rotates, by dragging or by the arrow keys."""
-    share = np.clip(sphere.values / (sphere.limit or 1.0), -1.0, 1.0)
-    points = [
-        [*(round(float(c), 3) for c in direction), round(float(s), 3), tip]
-        for direction, s, tip in zip(sphere.directions, share, sphere.said, strict=True)
-        if np.isfinite(s)
-    ]
-    about = f"{sphere.title}: {caption} Arrow keys turn it."
-    data = escape(json.dumps(points, ensure_ascii=False, separators=(",", ":")))
-    return (
-        f'<div class="sphere"><div class="ptitle">{escape(sphere.title)}</div>'
-        f'<canvas role="img" tabindex="0" aria-label="{escape(about)}" data-points="{data}"></canvas></div>'
-    )

@@ -19,10 +19,9 @@ from trihedron.report.chart import (
     Panel,
     Points,
     Span,
-    Sphere,
     limits_of,
 )
-from trihedron.report.directions import drawn_disc, drawn_sphere
+from trihedron.report.directions import drawn_disc
 from trihedron.report.layout import UNITS, Places, apart, ticks
 from trihedron.report.numbers import plain_number, with_sigma
 
@@ -49,11 +48,9 @@ def drawn(chart: Chart, caption: str) -> str:
     return "".join(parts)
 
 
-def _one(panel: Panel | Disc | Sphere, caption: str, around: tuple[int, bool]) -> str:
+def _one(panel: Panel | Disc, caption: str, around: tuple[int, bool]) -> str:
     if isinstance(panel, Disc):
         return drawn_disc(panel, caption)
-    if isinstance(panel, Sphere):
-        return drawn_sphere(panel, caption)
     return _panel(panel, caption, around)
 
 

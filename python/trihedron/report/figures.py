@@ -29,9 +29,7 @@ from trihedron.report.chart import (
     Points,
     Scale,
     Span,
-    Sphere,
 )
-from trihedron.report.directions import equal_area
 
 # The axes: distinct for colour-blind readers and in grey (Okabe and Ito).
 COLOURS: dict[Colour, str] = {
@@ -89,7 +87,7 @@ def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
 
 
 def draw_chart(chart: Callable[[], Chart]) -> Figure:
-    """Every panel of a chart: lines, points with uncertainties, bands and levels; discs, spheres."""
+    """Every panel of a chart: lines, points with uncertainties, bands and levels; discs."""
     laid_out = chart()
     columns, panels = laid_out.columns, laid_out.panels
     rows = -(-len(panels) // columns)
@@ -127,24 +125,16 @@ def _named(axes: Sequence[Axes]) -> dict[str, Artist]:
     return {name: mark for axis in axes for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
 
 
-def _draw_any(axis: Axes, panel: Panel | Disc | Sphere) -> None:
+def _draw_any(axis: Axes, panel: Panel | Disc) -> None:
     if isinstance(panel, Panel):
         _draw_panel(axis, panel)
         return
     axis.set_title(panel.title, fontsize=8.5, loc="left")
     _rim(axis)
-    if isinstance(panel, Disc):
-        for x, y, label, _, kind in panel.points:
-            shape, colour = ("o", COLOURS["c1"]) if kind == "taken" else ("^", COLOURS["accent"])
-            axis.plot(x, y, shape, markersize=9, color=colour, alpha=0.85)
-            axis.annotate(label, (x, y), ha="center", va="center", fontsize=5.5, color="white")
-        return
-    share = np.abs(panel.values) / (panel.limit or 1.0)
-    for up, value, size in zip(panel.directions, panel.values, share, strict=True):
-        # Directions below the horizon are hollow.
-        fill = "full" if up[2] >= 0.0 else "none"
-        colour = COLOURS["accent" if value > 0.0 else "c1"]
-        axis.plot(*equal_area(tuple(up)), "o", markersize=3.0 + 9.0 * size, color=colour, fillstyle=fill)
+    for x, y, label, _, kind in panel.points:
+        shape, colour = ("o", COLOURS["c1"]) if kind == "taken" else ("^", COLOURS["accent"])
+        axis.plot(x, y, shape, markersize=9, color=colour, alpha=0.85)
+        axis.annotate(label, (x, y), ha="center", va="center", fontsize=5.5, color="white")
 
 
 def _rim(axis: Axes) -> None:

@@ -1,3 +1,4 @@
+"use strict";
 (() => {
   const UNITS = 10000, MINUS = "\u2212";
   const tip = document.createElement("div");
@@ -188,45 +189,6 @@
     }
   }
   const all = [...document.querySelectorAll(".panel")].map((node) => new Panel(node));
-  class Sphere {
-    constructor(canvas) {
-      this.canvas = canvas; this.points = JSON.parse(canvas.dataset.points);
-      this.eye = Body.about([1, 0, 0], 0.38); this.view = Body.times(Body.about([0, 1, 0], -0.5), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]);
-      let last = null;
-      const hold = (e) => { last = [e.clientX, e.clientY]; canvas.setPointerCapture(e.pointerId); hide(); };
-      const move = (e) => {
-        if (!last) return this.point(e);
-        this.turn((e.clientX - last[0]) / 90, (e.clientY - last[1]) / 90); last = [e.clientX, e.clientY];
-      };
-      canvas.addEventListener("pointerdown", hold); canvas.addEventListener("pointermove", move);
-      canvas.addEventListener("pointerup", () => { last = null; }); canvas.addEventListener("pointerleave", hide);
-      canvas.addEventListener("keydown", (e) => {
-        const by = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, -0.15], ArrowDown: [0, 0.15] }[e.key];
-        if (by) { e.preventDefault(); this.turn(...by); }
-      });
-      new ResizeObserver(() => this.draw()).observe(canvas);
-      for (const q of ["print", "(prefers-color-scheme: dark)"]) matchMedia(q).addEventListener("change", () => this.draw());
-    }
-    turn(right, down) { this.view = Body.times(Body.times(Body.about([1, 0, 0], down), Body.about([0, 1, 0], right)), this.view); this.draw(); }
-    draw() {
-      const at = Body.begin(this.canvas, 0.44), { pen, ratio, r, cx, cy } = at;
-      const place = (v) => { const p = Body.apply(this.eye, Body.apply(this.view, v)); return [cx + r * p[0], cy - r * p[1], p[2]]; };
-      Body.globe(at, place);
-      this.shown = this.points.map(([x, y, z, share, said]) => ({ p: place([x, y, z]), share, said })).sort((a, b) => a.p[2] - b.p[2]);
-      const mark = ({ p, share }) => {
-        pen.globalAlpha = p[2] < 0 ? 0.3 : 1; pen.fillStyle = Body.colour(share < 0 ? "--c1" : "--accent");
-        pen.beginPath(); pen.arc(p[0], p[1], (2.5 + 10.5 * Math.sqrt(Math.abs(share))) * ratio, 0, 7); pen.fill(); pen.globalAlpha = 1;
-      };
-      this.shown.filter((m) => m.p[2] < 0).forEach(mark); Body.board(at, place); this.shown.filter((m) => m.p[2] >= 0).forEach(mark);
-    }
-    point(e) {
-      const box = this.canvas.getBoundingClientRect(), k = this.canvas.width / box.width;
-      const x = (e.clientX - box.left) * k, y = (e.clientY - box.top) * k;
-      const near = this.shown.filter((m) => Math.hypot(m.p[0] - x, m.p[1] - y) < 16 * k).sort((a, b) => b.p[2] - a.p[2])[0];
-      near ? show(near.said, e) : hide();
-    }
-  }
-  for (const canvas of document.querySelectorAll(".sphere canvas")) new Sphere(canvas);
   const labels = (node, text) => { node.addEventListener("pointermove", (e) => show(text, e)); node.addEventListener("pointerleave", hide); };
   for (const node of document.querySelectorAll(".pose")) labels(node, node.dataset.t);
 

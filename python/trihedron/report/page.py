@@ -51,7 +51,7 @@ def to_html(document: Document) -> str:
         for section in document.sections
     ]
     lead = None if document.lead is None else _shown(document.lead)
-    script = _file("body.js") + _file("page.js")
+    script = _file("page.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     foremost, others, place = _noticed(document)
     page = template("page.html.j2").render(
