@@ -18,12 +18,10 @@ from trihedron.cli import COMMANDS, main
 from trihedron.errors import InputError
 from trihedron.records import Finding, Severity
 from trihedron.records.domains import DOMAINS
-from trihedron.report.axes import axes_of
-from trihedron.report.calibration import axes_table, calibration_report
 from trihedron.report.calibration_pictures import uncalibrated_error
 from trihedron.report.chart import Bars, Chart, Disc, Level, Line, Note, Panel, Points, Scale, Span
 from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.document import Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import _path
 from trihedron.report.findings import combined, findings_block
 from trihedron.report.findings.wording import filled
@@ -58,7 +56,7 @@ def document():
         Section("Result", (Paragraph("words"), table, picture)),
         Section("Findings", (findings_block((finding,)),)),
     )
-    return Document("A title", "of a log", "Usable.", True, sections, (Headline("error", "1", "mm/s²"),), picture)
+    return Document("A title", "of a log", "Usable.", True, sections, picture)
 
 
 def test_a_report_comes_back_from_json_word_for_word_and_mark_for_mark():
@@ -136,20 +134,6 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report():
     assert given.model == pytest.approx(expected[0], abs=1e-9)
     for one in (result, several, again):
         assert "the reading without input (sign opposite to b)" in re.sub(r"\s+", " ", trihedron.report(one))
-
-
-def test_the_uncertainty_of_a_scale_is_one_figure_wherever_it_is_stated():
-    _, result, _ = usual()
-    document = calibration_report(result.calibration)
-    axes = next(s for s in document.sections if s.heading == "Axes").blocks
-    for sensor, table in zip(("accelerometer", "gyroscope"), axes, strict=True):
-        worst = max((row[2] for row in table.rows), key=float)
-        headline = next(h for h in document.headlines if h.what == f"{sensor} scale uncertainty")
-        assert (table.head[2], headline.unit, headline.value) == ("relative σ [%]", "%", worst)
-        # A bias stands once, in SI, over the sensitivity; the raw reading without input has another name.
-        assert table.head[-1].startswith("reading without input, −S⁻¹ b [count")
-    one = replace(result.accelerometer, S=np.eye(3), raw_unit="m/s^2")
-    assert "without input" not in " ".join(axes_table("accelerometer", one, axes_of(one)).head)
 
 
 @pytest.mark.parametrize("shift_deg_s", [0.0, 0.1])

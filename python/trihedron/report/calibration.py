@@ -1,6 +1,6 @@
 """The calibration as a laboratory report: result, findings, properties of the axes, residuals, uncertainty."""
 
-from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,15 +9,15 @@ from trihedron.records import Calibration, FitQuality, Recording, Segments, Sens
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import correlations, excluded_moves, strong_correlations
-from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables, undetermined
+from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
 from trihedron.report.calibration_pictures import (
     before_words,
     figure_blocks,
     lead_picture,
     uncalibrated_error,
 )
-from trihedron.report.document import USE_IT, WITHIN, Block, Document, Facts, Headline, Paragraph, Section, Table
-from trihedron.report.findings import findings_block, serious_ones, verdict_of
+from trihedron.report.document import USE_IT, WITHIN, Block, Document, Facts, Paragraph, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.findings.wording import opening
 from trihedron.report.numbers import (
     capital,
@@ -33,15 +33,13 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_unit,
 )
-from trihedron.report.segments import if_rate_is_right, rate_in_words, scale_by_rate
+from trihedron.report.segments import rate_in_words, scale_by_rate
 from trihedron.report.verification import USES
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
 FRAMES = {"lower": "lower-triangular (X along accelerometer X)", "symmetric": "symmetric", "case": "case"}
 """Printed names of the frames."""
 NEXT = f"Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`.{USE_IT}{USES}."
-MOST_PAIRS = 6
-"""Most correlated pairs in one line; a table lists all of them."""
 DRIFTS = "bias-drift", "gyro-bias-drift"
 """Findings that say which bias the stated one is; the verdict says so too."""
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -73,17 +71,9 @@ def calibration_report(
         verdict=verdict(calibration, errors_beside),
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
-        headlines=tuple(_headlines(calibration)),
         lead=lead_picture(calibration, segments),
         next_step=NEXT if calibration.is_trustworthy else "",
     )
-
-
-def _headlines(calibration: Calibration) -> list[Headline]:
-    """Cross-validated errors, uncertainties; last errors in sample, which the poses of another recording may exceed."""
-    errors = errors_of(calibration)
-    held, in_sample = ([line for line, _, is_held in errors if is_held is one] for one in (True, False))
-    return [*undetermined(serious_ones(calibration.findings)), *held, *scale_headlines(calibration), *in_sample]
 
 
 def _drift(calibration: Calibration) -> str:
@@ -93,21 +83,16 @@ def _drift(calibration: Calibration) -> str:
     return "".join(f"; it changes by up to {size} °/s" for size in sizes)
 
 
-def scale_headlines(calibration: Calibration) -> list[Headline]:
-    """The uncertainty of every sensor's scale on its worst axis."""
-    is_assumed = any(finding.code == "gravity-defaulted" for finding in calibration.findings)
-    uncertain = []
-    for name, sensor in calibration.sensors:
-        with suppress(ValueError):
-            worst = plain_number(100.0 * float(axes_of(sensor).scale_sigma.max()), 2)
-            is_open = is_assumed and name == "accelerometer"
-            beside = "1 σ, worst axis" + (", without the error of gravity" if is_open else "")
-            beside += if_rate_is_right(name, sensor.raw_unit)
-            uncertain.append(Headline(f"{name} scale uncertainty", worst, "%", beside))
-    return uncertain
+class StatedError(NamedTuple):
+    """An error of the fit: ``beside`` is how it was found, and the error of noise alone."""
+
+    what: str
+    value: str
+    unit: str
+    beside: str
 
 
-def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
+def errors_of(calibration: Calibration) -> list[tuple[StatedError, float, bool]]:
     """Gravity and tilt error and static rate, in times the noise alone, and whether they are cross-validated."""
     out = []
     quality = calibration.accelerometer.quality
@@ -116,7 +101,7 @@ def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
         rms = quality.rms if quality.held_out_rms is None else quality.held_out_rms
         beside = f"rms, {_kind(quality, is_held=is_held)}, {AT_REST}; noise alone {in_mm_s2(quality.floor)}"
         value = plain_number(mm_s2_from_m_s2(rms))
-        line = Headline("gravity error in static poses", value, "mm/s²", beside)
+        line = StatedError("gravity error in static poses", value, "mm/s²", beside)
         out.append((line, rms / max(quality.floor, TINY), is_held))
     moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
     angles = [] if moved is None else angles_of(moved)
@@ -126,12 +111,12 @@ def errors_of(calibration: Calibration) -> list[tuple[Headline, float, bool]]:
         beside += f"noise alone {plain_number(floor)}°"
         is_out = excluded_moves(moved)
         beside += f"; {is_out.sum()} of {how_many(len(is_out), 'move')} excluded" if is_out.any() else ""
-        line = Headline("tilt error after a rotation", plain_number(rms), "°", beside)
+        line = StatedError("tilt error after a rotation", plain_number(rms), "°", beside)
         out.append((line, rms / max(floor, TINY), is_held))
     if moved is not None and moved.static_rate_rms is not None and moved.static_rate_floor is not None:
         rms, floor = moved.static_rate_rms, moved.static_rate_floor
         beside = f"rms, {HELD_OUT}, {AT_REST}; noise alone {plain_number(degrees_from_radians(floor))} °/s"
-        line = Headline("gyro rate in static poses", plain_number(degrees_from_radians(rms)), "°/s", beside)
+        line = StatedError("gyro rate in static poses", plain_number(degrees_from_radians(rms)), "°/s", beside)
         out.append((line, rms / max(floor, TINY), True))
     return out
 
@@ -193,11 +178,6 @@ def _result(
         if name == "accelerometer" and segments is not None:
             rows += _before_in_words(calibration, segments)
         blocks += [parameter_table(name, sensor), Facts(tuple(rows))]
-    strong = strong_correlations(calibration)
-    if strong:
-        pairs = ", ".join(f"{a} and {b} {plain_number(r, 2)}" for a, b, r in strong[:MOST_PAIRS])
-        pairs += f"; {len(strong) - MOST_PAIRS} more" if len(strong) > MOST_PAIRS else ""
-        blocks.append(Facts((("correlations above 0.5", pairs),)))
     return tuple(blocks)
 
 
@@ -255,20 +235,13 @@ def _axes_block(name: str, sensor: SensorCalibration) -> Block:
 
 def axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
     raw, si = unit_in_print(sensor.raw_unit), unit_in_print(sensor.si_unit)
-    head = ["", "scale (sensitivity)" if raw == si else f"scale (sensitivity) [{raw} per {si}]", "relative σ [%]"]
-    columns = [
-        list(XYZ),
-        each_with_sigma(axes.sensitivity, axes.sigma_sensitivity),
-        [plain_number(100.0 * sigma, 2) for sigma in axes.scale_sigma],
-    ]
-    if raw != si:
-        # For readings in SI it equals the bias except for the scale, and is omitted.
-        head.append(f"reading without input, −S⁻¹ b [{raw}]")
-        columns.append(each_with_sigma(axes.at_zero, axes.sigma_at_zero))
+    head = ("", "scale (sensitivity)" if raw == si else f"scale (sensitivity) [{raw} per {si}]", "relative σ [%]")
+    scale = each_with_sigma(axes.sensitivity, axes.sigma_sensitivity)
+    columns = (XYZ, scale, [plain_number(100.0 * sigma, 2) for sigma in axes.scale_sigma])
     skew = each_with_sigma(axes.skew_rad, axes.sigma_skew_rad, mrad_from_radians(1.0))
     beyond = ", ".join(f"{pair} {angle} mrad" for pair, angle in zip(("X-Y", "X-Z", "Y-Z"), skew, strict=True))
     caption = f"{name.capitalize()} axes; angles between axes exceed 90° by {beyond}"
-    return Table(tuple(head), tuple(zip(*columns, strict=True)), caption)
+    return Table(head, tuple(zip(*columns, strict=True)), caption)
 
 
 def next_pose(calibration: Calibration) -> str:

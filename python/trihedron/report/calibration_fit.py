@@ -1,28 +1,21 @@
 """Residuals of the fit of S and b in words and tables, with one definition each in every report."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray, rms_of
-from trihedron.records import Calibration, Finding, FitQuality, Segments, SensorCalibration
+from trihedron.records import Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE, counted_moves
 from trihedron.report.axes import BIAS, axes_of
 from trihedron.report.calibration_charts import excluded_moves, move_noise_deg
-from trihedron.report.document import Block, Headline, Table
+from trihedron.report.document import Block, Table
 from trihedron.report.numbers import each_with_sigma, in_mm_s2, plain_number, shown, with_sigma
 from trihedron.report.segments import state_of
 from trihedron.units import mm_s2_from_m_s2
 
 METHODS = {"joint": "both sensors in one fit of poses and moves", "moves": "gravity after rotations between poses"}
 """Words for methods that records store as ids; other methods are words already."""
-
-
-def undetermined(grave: Sequence[Finding]) -> list[Headline]:
-    """The error of gravity in the orientation that the poses determine least, where the gravest finding is about it."""
-    sizes = [100.0 * one.numbers["worst_prediction_g"] for one in grave[:1] if "worst_prediction_g" in one.numbers]
-    what, beside = "error in the least certain orientation", "of gravity, 1 σ by the orientations that were recorded"
-    return [Headline(what, f"± {plain_number(size, 2)}", "%", beside) for size in sizes]
 
 
 def fit_in_words(sensor: SensorCalibration) -> list[tuple[str, str]]:

@@ -5,12 +5,11 @@ import numpy as np
 from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import next_pose
-from trihedron.report.calibration_fit import undetermined
 from trihedron.report.channels import channels_table
-from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
-from trihedron.report.findings import findings_block, serious_ones, verdict_of
-from trihedron.report.numbers import how_many, plain_number, shown
-from trihedron.report.segments import if_rate_is_right, recording_facts, signals_picture
+from trihedron.report.document import Block, Document, Facts, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.numbers import plain_number, shown
+from trihedron.report.segments import recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
 
 NONE = "–"
@@ -41,24 +40,9 @@ def check_report(
             Section("Result", (Facts(recording_facts(recording, segments)), *blocks)),
             Section("Findings", (findings_block(findings),)),
         ),
-        headlines=tuple(_headlines(segments, calibration)),
         lead=signals_picture(recording, segments),
         next_step="Calibrate: `trihedron calibrate LOG --latitude DEG -o calibration.json`.",
     )
-
-
-def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:
-    out = [] if calibration is None else undetermined(serious_ones(calibration.findings))
-    expected = {} if calibration is None else _expected_cells(calibration)
-    units = {} if calibration is None else {name: sensor.raw_unit for name, sensor in calibration.sensors}
-    for name, (scale, *_) in expected.items():
-        if scale == NONE:
-            out.append(Headline(f"{name} scale", "none", "", "this log does not determine it"))
-        else:
-            beside = f"1 σ, worst axis{if_rate_is_right(name, units.get(name, ''))}"
-            out.append(Headline(f"expected {name} scale uncertainty", scale, "", beside))
-    out.append(Headline("poses", str(segments.n_poses), "", how_many(len(segments.moves), "move")))
-    return out
 
 
 def _expected_cells(calibration: Calibration) -> dict[str, tuple[str, str, str]]:

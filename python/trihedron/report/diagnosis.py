@@ -8,10 +8,9 @@ from functools import partial
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
-from trihedron.report.calibration_fit import figures_table, undetermined
+from trihedron.report.calibration_fit import figures_table
 from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures
-from trihedron.report.diagnosis_headlines import differing_headline, headlines_of
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.diagnosis_numbers import (
@@ -29,7 +28,6 @@ from trihedron.report.diagnosis_words import (
     is_explained,
     judged_in_words,
     level_of,
-    own_serious,
     p_in_words,
     parameter_unit,
     quantity,
@@ -55,6 +53,8 @@ _CAPTIONS = {
 }
 EVEN = 1e-6
 """Scatter of timestamps, in sample intervals, that is the rounding of their numbers."""
+LEAST_SHARE = 0.005
+"""Smallest share of the misfit that is printed."""
 MOST_PARAMETERS = 9
 
 
@@ -98,7 +98,6 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
     strengths = strengths_picture(diagnosis)
-    grave = tuple(filter(None, (own_serious(diagnosis),)))
     # By a reference alone a model without a gyro, or a simulation, is not compared.
     is_compared = model != "" and (diagnosis.parameters != () or not by_reference_alone(diagnosis))
     if found is not None and strengths is not None and not is_model:
@@ -110,7 +109,6 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         verdict=whole_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
-        headlines=(*undetermined(grave), *differing_headline(diagnosis), *headlines_of(diagnosis)),
         lead=strengths,
         next_step=next_step_in_words(diagnosis, model, improved),
         stated_level=level_of(diagnosis),
@@ -231,6 +229,8 @@ def _parameters(effect: AcceptedEffect) -> str:
 
 def _evidence(effect: AcceptedEffect) -> str:
     words = f"p {p_in_words(effect.p_adjusted)} corrected for multiple testing, ΔBIC {plain_number(effect.delta_bic)}"
+    if effect.share is not None and effect.share > LEAST_SHARE:
+        words += f"; by itself it explains {plain_number(100.0 * effect.share, 2)} % of the misfit"
     if effect.held_out:
         words += "; cross-validated, " + _improvement(effect.held_out[0])
     return words + "."

@@ -43,10 +43,6 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
-def n_differing(diagnosis: Diagnosis) -> int:
-    return sum(len(_clear(members)) for members in _groups_that_differ(diagnosis).values())
-
-
 def _clear(members: list[ParameterDifference]) -> list[ParameterDifference]:
     """The components of a differing group that are named."""
     most = max(map(_in_sigmas, members))

@@ -110,22 +110,12 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Headline:
-    """A main figure of the report: ``beside`` is the text for comparison."""
-
-    what: str
-    value: str
-    unit: str = ""
-    beside: str = ""
-
-
-@dataclass(frozen=True)
 class Document:
     """A whole report. The first section is the one that fits one screen.
 
-    ``headlines`` (most important first) and the ``lead`` figure are next to the verdict; ``stated_level`` is the colour
-    without a serious finding, in place of that from ``is_trustworthy`` (good only without warnings);
-    ``provenance`` is how the report was made; ``next_step`` is the advice for the use of the result.
+    The ``lead`` figure is next to the verdict; ``stated_level`` is the colour without a serious finding, in place of
+    that from ``is_trustworthy`` (good only without warnings); ``provenance`` is how the report was made; ``next_step``
+    is the advice for the use of the result.
     """
 
     title: str
@@ -133,7 +123,6 @@ class Document:
     verdict: str
     is_trustworthy: bool
     sections: tuple[Section, ...] = field(default=())
-    headlines: tuple[Headline, ...] = ()
     lead: Picture | None = None
     stated_level: Level | None = None
     provenance: tuple[tuple[str, str], ...] = ()

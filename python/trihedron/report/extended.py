@@ -10,10 +10,10 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainResiduals
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
 from trihedron.records.results import CalibrationResult
-from trihedron.report.calibration import calibration_report, errors_of
+from trihedron.report.calibration import StatedError, calibration_report, errors_of
 from trihedron.report.chart import Chart, Panel
 from trihedron.report.diagnosis import effect_pictures, effects_blocks, residuals_chart
-from trihedron.report.document import Document, Headline, Picture, Section
+from trihedron.report.document import Document, Picture, Section
 from trihedron.report.names import MEANING, ids_in_print
 from trihedron.report.numbers import listed, plain_number, shown, with_unit
 from trihedron.report.reference import beside_reference, errors_beside
@@ -37,20 +37,18 @@ def calibration_result_report(result: CalibrationResult) -> Document:
 def _with_effects(document: Document, diagnosis: Diagnosis) -> Document:
     """The report with the residuals without and with the effects as its lead, and every effect after the result."""
     effects = Section("Effects fitted with S and b", (*effects_blocks(diagnosis), *effect_pictures(diagnosis)))
-    headlines = _headlines(diagnosis)
-    errors = listed([f"{one.what} {with_unit(one.value, one.unit)} ({one.beside})" for one in headlines])
+    errors = listed([f"{one.what} {with_unit(one.value, one.unit)} ({one.beside})" for one in _errors(diagnosis)])
     predicted = f" Errors over all poses and moves, {HELD_OUT} with the effects: {errors}." if errors else ""
     return replace(
         document,
         verdict=document.verdict + predicted,
         next_step=NEXT if document.next_step else "",
         sections=(document.sections[0], effects, *document.sections[1:]),
-        headlines=(*headlines, *document.headlines),
         lead=_changed_picture(diagnosis),
     )
 
 
-def _headlines(diagnosis: Diagnosis) -> list[Headline]:
+def _errors(diagnosis: Diagnosis) -> list[StatedError]:
     """Cross-validated errors with the effects, beside those of the S and b that a calibration without them saves."""
     own = getattr(diagnosis, "calibration", None)
     known = () if own is None else errors_of(own)
@@ -60,7 +58,7 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
         factor, unit = shown(one.unit)
         without = f"without them {with_unit(plain_number(factor * linear.rms), unit)}"
         beside = alone.get(MEANING[one.domain], without)
-        found.append(Headline(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
+        found.append(StatedError(MEANING[one.domain], plain_number(factor * one.rms), unit, beside))
     return found
 
 

@@ -9,7 +9,7 @@ from trihedron.arrays import XYZ, FloatArray
 from trihedron.records.filter_noise import RANKED_S, Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share
 from trihedron.records.plain import as_plain
 from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
-from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table, action_in_words
+from trihedron.report.document import Block, Document, Facts, Picture, Section, Table, action_in_words
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
 from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print, with_unit
@@ -65,7 +65,6 @@ def filter_noise_report(found: FilterNoise) -> Document:
         verdict=verdict_of(found.findings, _good(found), "Usable" + _predicted(found), "NOT TO BE TRUSTED"),
         is_trustworthy=is_trustworthy,
         sections=tuple(sections),
-        headlines=tuple(headline for one in found.sensors for headline in _headlines(one)),
         lead=picture if tested else None,
         next_step=next(uncalibrated, NEXT if len(found.sensors) == 2 else OF_ONE) if is_trustworthy else "",
     )
@@ -91,16 +90,6 @@ def _predicted(found: FilterNoise) -> str:
         said.append(f"{what} over {last.horizon_s:g} s predicted {sizes[0]}, was {sizes[1]}")
     own = " (the reference's own error included)" if any(one.reference is not None for one in found.sensors) else ""
     return f": {'; '.join(said)}{own}" if said else ""
-
-
-def _headlines(one: SensorFilterNoise) -> list[Headline]:
-    """N and K for the filter."""
-    out = []
-    for name, per, value, static in _terms(one):
-        beside = "95 % upper limit" if value.is_limit else f"95 % interval {_interval(value)}"
-        beside += "" if static is None else f"; static {_number(static)}"
-        out.append(Headline(f"{one.sensor}, {TERMS[name]}", _number(value), f"{unit_in_print(one.unit)}{per}", beside))
-    return out
 
 
 def _terms(one: SensorFilterNoise) -> tuple[tuple[str, str, Bounded, Bounded | None], ...]:

@@ -2,7 +2,6 @@
 
 import statistics
 from collections import Counter
-from collections.abc import Sequence
 from functools import partial
 from shlex import quote
 
@@ -10,10 +9,10 @@ import numpy as np
 
 from trihedron.arrays import BoolArray
 from trihedron.records.fleet import FleetLog, FleetSummary
-from trihedron.records.sessions import PARAMETERS, Parameter, Spread
+from trihedron.records.sessions import PARAMETERS, Parameter
 from trihedron.report.axes import TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Panel, Points, Scale
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.fleet_next_step import (
     BY_FILE,
@@ -25,8 +24,8 @@ from trihedron.report.fleet_next_step import (
     next_step_of_fleet,
 )
 from trihedron.report.names import axis_in_print, finding_in_print, id_in_print, label_of
-from trihedron.report.numbers import capital, first_of, how_many, listed, plain_number, shown
-from trihedron.report.sessions import change_in_words, found_or_limit, repeated_cells
+from trihedron.report.numbers import capital, first_of, how_many, in_mm_s2, listed, plain_number, shown
+from trihedron.report.sessions import change_in_words, repeated_cells
 
 VERDICTS = {
     "consistent": "no missing effect is detectable",
@@ -99,7 +98,6 @@ def fleet_report(summary: FleetSummary) -> Document:
         is_trustworthy=n_usable > 0 and not mixed,
         sections=tuple(sections),
         lead=lead,
-        headlines=_headlines(summary),
         next_step=next_step_of_fleet(summary, outliers, moved),
         stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or outliers or moved) else None,
     )
@@ -131,35 +129,14 @@ def _reason(log: FleetLog) -> str:
     return log.reason.replace(" LOG`", f" {quote(path)}`") if colon and path.endswith(log.name) and rest else log.reason
 
 
-def _headlines(summary: FleetSummary) -> tuple[Headline, ...]:
-    """Quality of the calibrations, and spread between devices."""
-    held = [log.held_out_rms_m_s2 for log in summary.logs if log.held_out_rms_m_s2 is not None and log.is_trustworthy]
-    factor, unit = shown("m/s^2")
-    out = []
-    if held:
-        beside = f"median of usable logs, cross-validated; worst {plain_number(max(held) * factor, 3)} {unit}"
-        typical = plain_number(statistics.median(held) * factor, 3)
-        out.append(Headline("gravity error in static poses", typical, unit, beside))
-    for name in ("accel-bias", "gyro-bias"):
-        axes = [one for one in summary.repeated if one.parameter.id == name]
-        spreads = [one.between for one in axes if one.between is not None]
-        if spreads:
-            factor, unit = shown("m/s^2" if name == "accel-bias" else "rad/s")
-            own = [one.within for one in axes if one.within is not None]
-            repeat = f"; session to session {found_or_limit(_largest(own), factor)} {unit}" if own else ""
-            beside = f"device to device, worst axis{repeat}"
-            out.append(Headline(id_in_print(name), found_or_limit(_largest(spreads), factor), unit, beside))
-    return tuple(out)
-
-
-def _largest(spreads: Sequence[Spread]) -> Spread:
-    return max(spreads, key=lambda one: (one.sd, one.high))
-
-
 def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
     status = Counter(log.status for log in summary.logs)
     doubtful = [log for log in summary.logs if log.status == "done" and not log.is_trustworthy]
     facts = [("calibrated", f"{how_many(status['done'], 'log')} of {len(summary.logs)}")]
+    held = [log.held_out_rms_m_s2 for log in summary.logs if is_usable(log) and log.held_out_rms_m_s2 is not None]
+    if held:
+        sizes = f"median {in_mm_s2(statistics.median(held))}, worst {in_mm_s2(max(held))}"
+        facts.append(("gravity error in static poses", f"{sizes}, cross-validated"))
     if doubtful:
         codes = Counter(code for log in doubtful for code in log.serious).most_common()
         why = ", ".join(f"{finding_in_print(code)} ({count})" for code, count in codes)

@@ -16,11 +16,11 @@ from trihedron.records import (
     NormKalmanCalibration,
 )
 from trihedron.records.published import BY_FILTER
-from trihedron.report.calibration import FRAMES, parameter_table, scale_headlines
-from trihedron.report.document import WITHIN, Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.calibration import FRAMES, parameter_table
+from trihedron.report.document import WITHIN, Block, Document, Facts, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.kalman_charts import convergence_chart, drift_chart, innovations_chart, norm_convergence_chart
-from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, unit_in_print
+from trihedron.report.numbers import each_with_sigma, in_mm_s2, plain_number, unit_in_print
 from trihedron.units import mm_s2_from_m_s2
 
 TEST = "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
@@ -42,7 +42,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         Section("Findings", (findings_block(calibration.findings),)),
         Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
     ]
-    _, residual = consistency = _headlines(outcome)
+    residual = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
     is_small = any(one.code == "innovations-too-small" for one in calibration.findings)
     is_tested = all(one.n for _, one, _ in _consistencies(outcome))
     return Document(
@@ -51,33 +51,14 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         verdict=verdict_of(
             calibration.findings,
             f"OK: {_SMALLER if is_small else _AS_PREDICTED}.",
-            f"{WITHIN}{residual.what} {residual.value} {residual.unit} rms" if is_tested else "Usable",
+            f"{WITHIN}{residual} {in_mm_s2(rms_of(outcome.residual_m_s2))} rms" if is_tested else "Usable",
             "NOT TO BE TRUSTED",
         ),
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
-        headlines=(*consistency, *scale_headlines(calibration)),
         lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)) if is_tested else None,
         next_step=TEST if calibration.is_trustworthy else "",
     )
-
-
-def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headline]:
-    """Normalised innovations, and the residual of the poses."""
-    seen = _consistencies(outcome)
-    name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))) if one[1].n else np.inf)
-    beside = f"0 of {n} poses judged: the fit has no redundancy"
-    if worst.n:
-        beside = f"mean of {worst.n} of {n} poses; 1 where the noise model is right ({_limits(worst)} in 99 % of "
-        beside += f"cases): {_meaning(worst)}"
-    of = "" if len(seen) == 1 else f", {name.upper()}"
-    rms = rms_of(outcome.residual_m_s2)
-    what = "residual" if isinstance(outcome, KalmanCalibration) else "gravity error in static poses"
-    told = f"rms over {how_many(n, 'pose')}, {BY_FILTER}{'' if worst.n else _IN_SAMPLE}"
-    return [
-        Headline(f"innovation² / predicted variance (NIS){of}", plain_number(worst.nis_mean), "", beside),
-        Headline(what, plain_number(mm_s2_from_m_s2(rms)), "mm/s²", told),
-    ]
 
 
 def _consistencies(outcome: KalmanCalibration | NormKalmanCalibration) -> list[tuple[str, Consistency, int]]:

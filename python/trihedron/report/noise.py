@@ -8,14 +8,14 @@ import numpy as np
 
 from trihedron.records import AllanCurve, Finding, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.records.noise import of_axes
-from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Code, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
 from trihedron.report.noise_charts import allan_chart, curve_chart, part_names, sensors_chart
 from trihedron.report.noise_units import IN_SLOW_NOISE, TERM_WORDS, customary, term_in_words, unit_of
-from trihedron.report.numbers import duration, how_many, listed, plain_number, unit_in_print, with_sigma_and_power
+from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.report.segments import rate_in_words
-from trihedron.units import degrees_from_radians, micro_g_from_m_s2
+from trihedron.units import micro_g_from_m_s2
 
 _NO_UNIT = """The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with \
 --gyro-lsb and --accel-lsb."""
@@ -51,7 +51,6 @@ def noise_report(
         verdict=verdict_of(findings, _good(noise), _usable(noise), "NOT TO BE TRUSTED"),
         is_trustworthy=noise.is_trustworthy,
         stated_level="usable" if noise.shows_white_alone else None,
-        headlines=tuple(_headlines(groups)),
         lead=_lead(noise, groups) if groups else None,
         next_step=_next(noise) if noise.is_trustworthy else "",
         sections=(
@@ -94,34 +93,6 @@ def _next(noise: Noise) -> str:
         return " ".join(longer or [f"Take N alone into a filter {LINES}.", *actions])
     has_walk = any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes)
     return NEXT if has_walk else f"Take N into a filter {LINES}, for K its upper limit: a longer log measures it."
-
-
-def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
-    """White noise of each sensor, rms over its axes, also in data-sheet units, and the best averaging time."""
-    out = []
-    for unit, axes in groups:
-        name = {"gyro": "gyroscope", "accel": "accelerometer"}.get(axes[0].name.split()[0], axes[0].name.split()[0])
-        present = [a.terms[TermName.WHITE] for a in axes if a.terms[TermName.WHITE].is_present]
-        if present:
-            rms, _ = of_axes(present)
-            n = "1 axis" if len(present) == 1 else f"{len(present)} axes"
-            beside = f"N, rms of {n}{_on_data_sheets(rms, unit)}"
-            out.append(Headline(f"{name}, white noise", plain_number(rms), unit_of(TermName.WHITE, unit), beside))
-        best = [found[0] for a in axes if (found := a.optimal_averaging()) is not None]
-        if best:
-            low, high = (plain_number(t, 2) for t in (min(best), max(best)))
-            words = low if low == high else f"{low} to {high}"
-            beside = "minimum of the fitted terms" + ("" if low == high else ", axis by axis")
-            without = [axis_in_print(a.name).split()[-1] for a in axes if a.optimal_averaging() is None]
-            beside += f"; {listed(without)} {BEYOND}" if without else ""
-            out.append(Headline(f"{name}, best averaging time", words, "s", beside))
-    return out
-
-
-def _on_data_sheets(density: float, unit: str) -> str:
-    if unit == "rad/s":
-        return f"; {plain_number(degrees_from_radians(density))} °/s/√Hz"
-    return f"; {plain_number(micro_g_from_m_s2(density))} µg/√Hz" if unit == "m/s^2" else ""
 
 
 def _kalibr(noise: Noise) -> tuple[Block, ...]:

@@ -3,7 +3,7 @@
 import math
 
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan
-from trihedron.report.document import Document, Headline, Paragraph, Section, Table
+from trihedron.report.document import Document, Paragraph, Section, Table
 from trihedron.report.numbers import MINUS, plain_number
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
@@ -38,7 +38,6 @@ def plan_report(plan: ExperimentPlan) -> Document:
         f"gyro's scale to {_percent(turns.scale)}{_beside_moves(plan)}.{remedy}",
         is_trustworthy=True,
         stated_level="usable" if remedy else "good",
-        headlines=tuple(_headlines(plan, best)),
         next_step=_next_step(plan),
         sections=(
             Section("Poses", (_poses(plan.poses),)),
@@ -85,13 +84,6 @@ def _next_step(plan: ExperimentPlan) -> str:
         f"{step} For the gyro, turn the sensor between them about each level axis in turn, {moves.name}: "
         f"{moves.n_moves} such moves give all {ALL_NUMBERS} of its parameters (scale {_percent(moves.scale)})."
     )
-
-
-def _headlines(plan: ExperimentPlan, best: PosePlan | None) -> list[Headline]:
-    """What that set of poses and the turns would lead to."""
-    found = [] if best is None else [("accelerometer scale", best.scale, f", {best.n_poses} poses")]
-    found.append(("gyro scale by turns", plan.turns.scale, ""))
-    return [Headline(what, plain_number(100.0 * scale, 2), "%", f"1 σ, worst axis{n}") for what, scale, n in found]
 
 
 def _moves(moves: tuple[MovePlan, ...]) -> tuple[Table, Paragraph]:

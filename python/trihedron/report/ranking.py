@@ -9,7 +9,6 @@ from trihedron.report.findings import by_weight, findings_block
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
 from trihedron.report.verification import (
     above_noise,
-    headlines_of,
     imprecise,
     parameters_table,
     use_in_words,
@@ -56,7 +55,6 @@ def ranking_report(ranking: Ranking) -> Document:
         verdict=verdict,
         is_trustworthy=not best.is_rejected,
         sections=tuple(sections),
-        headlines=headlines_of(v),
         next_step="Calibrate again: none of these fits this log." if best.is_rejected else use_in_words(v, best.name),
     )
 

@@ -12,7 +12,7 @@ from trihedron.records.published import HELD_OUT
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
 from trihedron.report.calibration import calibration_report, shared_power
 from trihedron.report.chart import AXIS_COLOURS, TWO_SIGMA, Band, Chart, Level, Line, Mark, Panel, Scale, Span
-from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
 from trihedron.report.drawn import envelope
 from trihedron.report.names import axis_in_print, id_in_print
 from trihedron.report.numbers import (
@@ -90,20 +90,6 @@ def errors_beside(references: Sequence[AgainstReference]) -> str:
     return f"{listed(said)}, {HELD_OUT}" if said else ""
 
 
-def reference_headlines(found: AgainstReference) -> list[Headline]:
-    """The attitude error of the calibrated gyro, and the reference's own error."""
-    error = found.error
-    size = plain_number(degrees_from_radians(error.slow_rad[0]), 2)
-    out = [Headline("slow error of the reference", size, "°", f"1 σ an axis, within {plain_number(error.slow_s, 2)} s")]
-    if found.replay:
-        *others, last = found.replay
-        beside = f"gyro alone, calibrated {last.stage}, cross-validated"
-        beside += "".join(f"; {r.stage}: {plain_number(degrees_from_radians(r.error_rad))}°" for r in others)
-        angle = plain_number(degrees_from_radians(last.error_rad))
-        out.insert(0, Headline(f"attitude error after {last.horizon_s:g} s", angle, "°", beside))
-    return out
-
-
 def references_report(calibration: Calibration, references: tuple[AgainstReference, ...]) -> Document:
     """Lay out one unit with several references: the shared calibration, then the results of each recording."""
     document = calibration_report(calibration, errors_beside=errors_beside(references))
@@ -141,7 +127,6 @@ def beside_reference(document: Document, found: AgainstReference | None, place: 
         document,
         subtitle=f"{document.subtitle} beside {escaped(found.source)}",
         sections=(*document.sections[:place], section, *document.sections[place:]),
-        headlines=(*reference_headlines(found), *document.headlines),
         lead=error_picture(found) or document.lead,
     )
 

@@ -10,7 +10,7 @@ from trihedron.records import Finding, Pose, Recording, Segments, Severity, Trut
 from trihedron.records.noise import least_length_s
 from trihedron.report.channels import logged_sensors
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Points, Scale, Span
-from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.document import Document, Facts, Picture, Section, Table
 from trihedron.report.drawn import envelope, said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, each_with_sigma, how_many, plain_number, unit_in_print
@@ -37,10 +37,6 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
             Section("Result", (Facts(facts),)),
             Section("Findings", (findings_block(findings),)),
             Section("Poses", (pose_table(segments, recording),)),
-        ),
-        headlines=(
-            Headline("poses", str(segments.n_poses), "", still),
-            Headline("moves between them", str(len(segments.moves))),
         ),
         lead=Picture("poses", "Mean readings.", partial(means_chart, segments))
         if recording is None
@@ -84,11 +80,6 @@ def scale_by_rate(recording: Recording) -> str:
     """What a wrong sampling rate would do unseen: the scale of a gyro in counts rests on it."""
     is_open = recording.gyroscope is not None and recording.gyroscope_unit is RateUnit.COUNTS
     return "; the gyro's scale rests on it: in counts a wrong rate shows nowhere else" if is_open else ""
-
-
-def if_rate_is_right(sensor: str, raw_unit: str) -> str:
-    """The condition on the uncertainty of a scale: a wrong rate changes that of a gyro in counts, and nothing else."""
-    return ", if the sample rate is right" if sensor == "gyroscope" and raw_unit == RateUnit.COUNTS.value else ""
 
 
 def _still_s(segments: Segments) -> float:

@@ -21,16 +21,15 @@ from trihedron.records.sessions import (
 )
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
-from trihedron.report.document import USE_IT, Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import USE_IT, Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print, id_in_print, ids_in_print, label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, plain_number, shown, with_sigma
-from trihedron.report.segments import if_rate_is_right
 from trihedron.report.verification import USES
 
 DRIFTING = ("accel-bias", "accel-scale", "gyro-bias", "gyro-scale")
-"""Groups of parameters in the picture and the headlines."""
+"""Groups of parameters in the picture."""
 REPEATS = "session to session (1 σ)"
 SEVERAL = "Several devices"
 MOST_NAMED = 6
@@ -86,7 +85,6 @@ def sessions_report(model: SessionsModel) -> Document:
         verdict=verdict_of(others, f"{usable}." if changed else f"OK: {agree}.", usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
-        headlines=_headlines(model),
         lead=_lead(model),
         next_step=(NEXT_DEVICE if model.by == "device" else NEXT) if model.is_trustworthy else "",
     )
@@ -100,34 +98,6 @@ def _worst(model: SessionsModel) -> str:
     worst = max(known, key=lambda one: one.gravity_error_m_s2)
     size = f"{in_mm_s2(worst.gravity_error_m_s2)} ({plain_number(worst.times_noise, 2)} times noise alone)"
     return f"; gravity error in static poses up to {size}, cross-validated"
-
-
-def _headlines(model: SessionsModel) -> tuple[Headline, ...]:
-    """Uncertainty of the next recording's parameters on the worst axis: of the common value, with repeatability; where
-    none is detectable, also with its upper limit, which is wide for few recordings."""
-    out = []
-    for name in DRIFTING:
-        axes = [one for one in model.repeated if one.parameter.id == name]
-        if not axes:
-            continue
-        factor, unit = shown(axes[0].parameter.unit)
-        ahead = [factor * math.hypot(one.std, 0.0 if one.within is None else one.within.sd) for one in axes]
-        k = int(np.argmax(ahead))
-        what, within = id_in_print(name), axes[k].within
-        value = f"± {plain_number(ahead[k], 2)}"
-        if within is not None and not within.sd:
-            value += f" to {plain_number(math.hypot(ahead[k], factor * within.high), 2)}"
-        beside = f"1 σ, worst axis: common value {plain_number(factor * axes[k].std, 2)} {unit}"
-        beside += "" if within is None else f", session to session {found_or_limit(within, factor)} {unit}"
-        gyro = model.calibration.gyroscope
-        beside += if_rate_is_right("gyroscope", gyro.raw_unit) if gyro is not None and name == "gyro-scale" else ""
-        out.append(Headline(f"{what} in the next recording", value, unit, beside))
-    return tuple(out)
-
-
-def found_or_limit(spread: Spread, factor: float) -> str:
-    """A standard deviation, or its upper limit (95 %) where none is detectable."""
-    return plain_number(factor * spread.sd, 2) if spread.sd else f"below {plain_number(factor * spread.high, 2)}"
 
 
 def _lead(model: SessionsModel) -> Picture:

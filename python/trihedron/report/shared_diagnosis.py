@@ -17,7 +17,7 @@ from trihedron.report.diagnosis_words import (
     value_in_words,
     verdict_in_words,
 )
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
@@ -63,10 +63,6 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
             Section("Candidates", (Table(("effect", "score together"), tried, "The catalogue"),)),
         ),
         stated_level="bad" if doubted else "usable" if found.effects or alone else "good",
-        headlines=(
-            Headline("recordings", str(len(found.diagnoses)), "", f"{len(alone)} with effects of their own"),
-            Headline("shared effects", str(len(own)), "", f"of the {owner}"),
-        ),
         lead=_lead(found, names),
         next_step=_next_step(found, own, list(doubted)),
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.records import Finding, Recording, SensorCalibration, Severity, TermName, Truth
 from trihedron.report.calibration import parameter_table
-from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, likely, verdict_of
 from trihedron.report.noise_units import unit_of
 from trihedron.report.numbers import duration, how_many, plain_number
@@ -60,10 +60,6 @@ def simulation_report(
             Section("True parameters", (*_linear(recording, truth), *_noise(truth))),
         ),
         next_step=_next_step(truth, repeated, kept or "the truth (--truth FILE keeps it)"),
-        headlines=(
-            Headline("poses", str(len(truth.poses)), "", moves),
-            Headline("effects", str(n), "", ", ".join(truth.effects) or f"none {BEYOND}"),
-        ),
         lead=Picture("signals", caption, partial(truth_chart, recording, truth)),
     )
 

@@ -11,9 +11,9 @@ from trihedron.records import Finding, Recording, Segments, Severity, Verificati
 from trihedron.report.axes import TRIAD
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Mark, Panel, Points, Scale
-from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
 from trihedron.report.drawn import said
-from trihedron.report.findings import by_weight, findings_block, likely, verdict_of
+from trihedron.report.findings import findings_block, likely, verdict_of
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import label_of
 from trihedron.report.numbers import each_with_sigma, how_many, in_mm_s2, listed, plain_number, shown, with_unit
@@ -58,7 +58,6 @@ def verification_report(
         verdict=verified_in_words(v),
         is_trustworthy=verification.is_passed,
         sections=tuple(sections),
-        headlines=headlines_of(v),
         lead=Picture("errors", caption, partial(verification_chart, v)),
         next_step=use_in_words(v, "the calibration"),
     )
@@ -143,28 +142,6 @@ def _errors(v: Verification) -> list[tuple[str, str, str, str, str, str]]:
         allowed = f"{plain_number(rms_of(sigma))} °/s, χ²/dof {plain_number(chi2, 2)}"
         out.append(("gyro rate in static poses", plain_number(rms_of(change)), "°/s", of, allowed, worst))
     return out
-
-
-def headlines_of(v: Verification) -> tuple[Headline, ...]:
-    """The errors with their expected size, the one that fails first: by its limit, else the one of the verdict; the
-    change of the gyro's bias last, or first where it alone does."""
-    out = [
-        Headline(what, rms, unit, f"rms over {of}; expected {allowed}")
-        for what, rms, unit, of, allowed, _ in _errors(v)
-    ]
-    gravest = next(iter(by_weight(above_noise(v))), None)
-    code = "residual-above-noise" if gravest is None else gravest.code
-    for one in v.findings:
-        if one.code == "limit-exceeded":
-            code = "held-out-worse" if "limit_deg" in one.numbers else "residual-above-noise"
-            break
-    moved = [
-        Headline("gyro bias changed by", changes.replace(" ± ", "\u00a0±\u00a0"), "°/s", WITH_DRIFT)
-        for changes in _bias_changes(v)
-    ]
-    errors = sorted(out, key=lambda one: one.what != _ABOVE_NOISE[code])
-    is_bias = v.is_passed and gravest is None and any(not one.numbers["n_others"] for one in _shifts(v))
-    return (*moved, *errors) if is_bias else (*errors, *moved)
 
 
 def facts_of(v: Verification) -> tuple[tuple[str, str], ...]:
