@@ -1,4 +1,4 @@
-"""Every statement about noise terms against the truth: intervals, limits, names; figures of docs/noise.md, section 7.
+"""Every statement about noise terms against the truth: intervals, limits, names; figures of docs/noise.md, section 6.
 
 python benches/noise_coverage.py [RUNS [curve]]       six mixes x three lengths, from logs or from their Allan curves
 
@@ -13,8 +13,6 @@ import time
 import numpy as np
 from scipy.signal import lfilter
 
-from trihedron.estimate.noise.allan import allan_deviation
-from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.records.noise import TermName
 
@@ -69,13 +67,7 @@ def rounded_angle(rng, rate, h, Q):
     return np.diff(np.round(angle / step)) * step / h
 
 
-def from_curve(x, rate_hz):
-    """The noise of the log's Allan curve alone."""
-    curve = allan_deviation(x, rate_hz)
-    return identify_curve(curve.tau_s, curve.deviation, rate_hz, len(x))
-
-
-def trial(seed, n, rate_hz, mix, runs, identify=identify_noise):
+def trial(seed, n, rate_hz, mix, runs):
     """(runs, 5) whether the interval holds the truth, (runs, 6) what is named, last B and K as a pair; relative errors;
     seconds a run."""
     rng = np.random.default_rng(seed)
@@ -84,7 +76,7 @@ def trial(seed, n, rate_hz, mix, runs, identify=identify_noise):
         truth["Q"] *= truth["N"] / np.sqrt(rate_hz)
     inside, named, errors, began = [], [], {s: [] for s in "NBK" if s in truth}, time.perf_counter()
     for _ in range(runs):
-        axis = identify(in_time(rng, n, rate_hz, **truth), rate_hz).axes[0]
+        axis = identify_noise(in_time(rng, n, rate_hz, **truth), rate_hz).axes[0]
         terms = axis.terms
         found = [terms[TermName(s)] for s in TERMS]
         inside.append([t.lower <= truth.get(s, 0.0) <= t.upper for s, t in zip(TERMS, found, strict=True)])
@@ -95,13 +87,12 @@ def trial(seed, n, rate_hz, mix, runs, identify=identify_noise):
     return np.array(inside), np.array(named), errors, (time.perf_counter() - began) / runs
 
 
-def main(runs=200, kind="log"):
+def main(runs=200):
     """Coverage of the 95 % statement of every term, whether named or not (named in brackets), %."""
     cells, false = [], []
     for i, (n, rate_hz) in enumerate(LENGTHS):
         for j, mix in enumerate(MIXES):
-            identify = from_curve if kind == "curve" else identify_noise
-            inside, named, errors, seconds = trial(1000 + 10 * i + j, n, rate_hz, mix, int(runs), identify)
+            inside, named, errors, seconds = trial(1000 + 10 * i + j, n, rate_hz, mix, int(runs))
             cells.append(inside.mean(axis=0))
             false.append(named[:, [*(s not in mix for s in TERMS), False]].any(axis=1).mean())
             said = " ".join(

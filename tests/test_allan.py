@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import re
 from contextlib import redirect_stdout
 from dataclasses import replace
 
@@ -260,25 +259,6 @@ def test_the_table_names_every_term_and_the_files_hold_the_same(files):
     assert len(rows) == 1 + len(document["curve"]["tau_s"])
     assert files["png"].read_bytes().startswith(b"\x89PNG")
     assert files["html"].read_text().count("<figure id=") == 3  # both sensors, then each
-
-
-def test_the_terms_come_back_from_the_written_curve_alone(files, capsys):
-    table = files["csv"]
-    assert "--samples" in rejected(capsys, "allan", table, "--curve")
-    in_counts = table.with_name("counts.csv")
-    in_counts.write_text(re.sub(r"\[[^]]*\]", "[counts]", table.read_text()))
-    assert main(["allan", str(in_counts), "--curve", "--samples", "180000"]) == 0
-    advice = capsys.readouterr().out
-    assert "--gyro-unit UNIT" in " ".join(advice.split())  # at any width of the terminal
-    assert "lsb" not in advice.partition("Result")[0]
-    assert main(["allan", str(table), "--curve", "--samples", "180000", "--json"]) == 0
-    axes = json.loads(capsys.readouterr().out)["axes"]
-    for axis in axes:
-        truth_n, truth_k = (2e-4, 3e-6) if axis["unit"] == "rad/s" else (2e-3, 3e-5)
-        # N to 0.3 %, K to 25 % from an hour: four standard errors.
-        assert axis["terms"]["N"]["value"] == pytest.approx(truth_n, rel=0.012)
-        term = axis["terms"]["K"]
-        assert not term["present"] or term["value"] == pytest.approx(truth_k, abs=4 * term["sigma"])
 
 
 def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):

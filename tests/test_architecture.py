@@ -250,8 +250,6 @@ def test_a_refusal_is_told_from_a_defect():
 CONVERSIONS = {
     "api/naming_columns.py: float",
     "api/reading_arrays.py: np.ma.asanyarray",
-    "api/streaming.py: note.read_text",
-    "api/streaming.py: json.loads",
     "api/asking.py: result_in_python",
     "api/asking.py: verb",
     "api/asking.py: item.item",

@@ -186,7 +186,7 @@ def test_white_noise_has_no_corner_and_says_above_what_one_would_lie(sessions, m
         for axes in log(seed, (0.0, 0.0)).low_passes.values():
             named += axes[0].corner_hz is not None
             assert axes[0].corner_hz is not None or axes[0].above_hz > 40.0
-    # 4 in 100 sessions at most invent one (docs/noise.md, 8): two of 4 come once in 100 then, three of 20 once in 30.
+    # 4 in 100 sessions at most invent one (docs/noise.md, 7): two of 4 come once in 100 then, three of 20 once in 30.
     assert named <= most
 
 

@@ -48,13 +48,6 @@ def filled(step):
             "`trihedron verify FILE OTHER_LOG`; `trihedron apply FILE LOG`.",
             f"`trihedron verify cal.json OTHER_LOG`; `trihedron apply cal.json {MY_LOG}`.",
         ),
-        # One of several logs by its name is read as it was.
-        ([], "`trihedron diagnose 'my log.csv'`", f"`trihedron diagnose {MY_LOG} --latitude 59.9`"),
-        (
-            [(now.note_log, LogSource(accel=Path("a.csv"), gyro=Path("g.csv"), rate=50.0))],
-            "`trihedron diagnose --accel a.csv --gyro g.csv`",
-            "`trihedron diagnose --accel a.csv --gyro g.csv --rate 50 --latitude 59.9`",
-        ),
         # The place and a reference go to commands that take them.
         (
             [(now.note_reference, "motion.csv")],
@@ -71,7 +64,7 @@ def test_a_command_of_the_next_step_names_what_was_given_where_it_is_taken(notes
 
 def test_a_calibration_that_was_not_written_is_stored_first():
     said = filled("Use it: `trihedron apply FILE LOG`.")
-    assert said.startswith(f"Store it (`trihedron calibrate {MY_LOG} --latitude 59.9 -o calibration.json`).")
+    assert said.startswith("Store it: add `-o calibration.json` to this command.")
     assert f"`trihedron apply calibration.json {MY_LOG}`" in said
 
 
@@ -85,14 +78,6 @@ def test_the_command_that_a_simulation_of_turns_suggests_gives_a_calibration_tha
     out = capsys.readouterr().out
     assert "turns by stated angles were fitted" in out
     assert "NOT TO BE TRUSTED" not in out
-
-
-def test_a_command_names_all_logs_and_repeats_no_output():
-    words = ("noise", "a.csv", "--json=r.json", "--report", "r.html", "--force", "--rate=9")
-    assert now.again(words) == "trihedron noise a.csv --rate=9"
-    now.begin(("diagnose", "one.csv", "two.csv", "--alpha", "0.02", "--gravity", "9.8", "--json", "out.json"))
-    said = filled("Calibrate: `trihedron calibrate ... -o calibration.json`.")
-    assert said == "Calibrate: `trihedron calibrate one.csv two.csv --gravity 9.8 -o calibration.json`."
 
 
 def test_poses_to_add_come_before_effects_and_effects_of_one_session_are_not_stored():
@@ -127,16 +112,6 @@ def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
     assert "without effects are not to be trusted" in next_step_in_words(found)
     moves.disagrees = True
     assert next_step_in_words(found) == "Record again."
-
-
-def test_a_log_that_was_excluded_is_not_in_the_next_command():
-    now.begin(("calibrate", "bad.csv", "good.csv", "fine.csv", "--latitude", "59.9"))
-    logs = [LogSource(log=Path(name)) for name in ("bad.csv", "good.csv", "fine.csv")]
-    now.note_log(logs[0])
-    now.note_excluded(["bad.csv"], logs)
-    said = filled("Store it: `... -o calibration.json`; use it: `trihedron apply FILE LOG`.")
-    assert "trihedron calibrate good.csv fine.csv --latitude 59.9" in said
-    assert "calibration.json good.csv`" in said
 
 
 def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():

@@ -9,9 +9,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from noise_coverage import in_time
-from trihedron.estimate.noise.allan import allan_deviation
 from trihedron.estimate.noise.binned import binned
-from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.slow_changes import slow_changes
 from trihedron.estimate.noise.spectrum import Ordinates
@@ -290,36 +288,6 @@ def test_scattered_loss_leaves_the_terms_where_they_are_and_holes_make_no_proces
         assert len(truth) > 1 or present(noise.axes[0]) == {"N"}
     # Of intervals of 95 % three quarters or more hold, with a probability of 0.99 at least.
     assert inside >= 4.5 * len(truth)
-
-
-@pytest.mark.parametrize(
-    "truth", [{"N": 1e-2, "B": 1e-2}, {"Q": 5e-4, "N": 1e-2, "K": 1e-2}, {"N": 1e-2, "R": 6e-4}], ids="".join
-)
-def test_the_terms_of_a_curve_are_found_and_their_intervals_hold(truth):
-    rng = np.random.default_rng(52)
-    clusters = 2 ** np.arange(15)
-    right = inside = 0
-    for _ in range(3):
-        curve = allan_deviation(in_time(rng, 1 << 16, 100.0, **truth), 100.0, clusters)
-        axis = identify_curve(curve.tau_s, curve.deviation, 100.0, 1 << 16).axes[0]
-        right += {t.value for t in TermName if axis.terms[t].is_present} == set(truth)
-        inside += sum(axis.terms[TermName(s)].lower <= v <= axis.terms[TermName(s)].upper for s, v in truth.items())
-    # At 95 % each: two of three or more has a probability of 0.993, and so has half the intervals.
-    assert right >= 2
-    assert inside >= 0.5 * 3 * len(truth)
-
-
-def test_a_filtered_curve_is_quoted_from_above_the_filter():
-    rng = np.random.default_rng(53)
-    x = in_time(rng, 1 << 17, 100.0, N=1e-2, K=1e-3)
-    x = np.convolve(x, np.full(8, 1 / 8), mode="valid")
-    curve = allan_deviation(x, 100.0, 2 ** np.arange(16))
-    axis = identify_curve(curve.tau_s, curve.deviation, 100.0, len(x)).axes[0]
-    assert "spectrum-low-pass" in {f.code for f in axis.findings}
-    # Points are believed to 2 %, beside which flicker may be there.
-    white = axis.terms[TermName.WHITE]
-    assert white.sigma < 0.1 * white.value
-    assert abs(white.value - 1e-2) < 3.0 * white.sigma
 
 
 @pytest.mark.parametrize("kind", ["wave", "levels", "walk", "flicker", "white"])

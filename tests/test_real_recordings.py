@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 import trihedron
 from trihedron.api.demonstrating import compare_with_truth, truth_of_the_day
-from trihedron.api.identifying import allan, noise_of_curve
+from trihedron.api.identifying import allan
 from trihedron.cli import main
 from trihedron.estimate.noise.streamed import stream_noise
 from trihedron.estimate.session import solved as of_session
@@ -272,18 +272,6 @@ def test_colouring_of_the_phone_log_is_recognised_and_terms_come_from_below(real
         # The spectrum falls to 0.4 % by 5 Hz and is flat below 0.15 Hz.
         assert axis.highest_hz < 0.2
         assert not axis.terms[TermName.QUANTISATION].is_present
-
-
-def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_data, tmp_path):
-    # Without its accelerometers, of which nothing is stated here.
-    lines = (real_data / "allan_curves" / "adis_av.csv").read_text().splitlines()
-    (tmp_path / "curve.csv").write_text("\n".join(lines[:1] + [line for line in lines if "Gyro" in line]) + "\n")
-    curve = noise_of_curve(tmp_path / "curve.csv", gyroscope_unit="deg/s")
-    for axis, logged in zip(curve.axes, adis.axes[:3], strict=True):
-        # The filter still takes 1 % where the curve is believed.
-        assert axis.value("N") == pytest.approx(logged.value("N"), rel=0.02)
-        mine, theirs = axis.terms[TermName.BIAS_INSTABILITY], logged.terms[TermName.BIAS_INSTABILITY]
-        assert abs(mine.value - theirs.value) < 3.0 * np.hypot(mine.sigma, theirs.sigma)
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ import trihedron
 from small_session import made_once
 from trihedron.records import SensorCalibration
 
-SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman", "allan", "allan_deviation")
+SHOWN = ("read", "segment", "calibrate", "verify", "check", "diagnose", "kalman", "allan")
 
 
 @pytest.fixture(scope="module")
@@ -294,7 +294,7 @@ def test_a_result_is_plain_types_a_frame_a_figure_and_a_piece_of_html(results, n
     assert "<img" not in page
     assert len(repr(one)) < 160
     assert trihedron.report(one)
-    is_data = name in ("read", "segment", "allan_deviation", "read_calibration")
+    is_data = name in ("read", "segment", "read_calibration")
     assert is_data or str(one).count("\n") > 5
 
 

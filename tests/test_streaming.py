@@ -1,10 +1,9 @@
-"""Logs larger than memory: the same results as of the whole, in bounded memory, gone on with from a checkpoint."""
+"""Logs larger than memory: the same results as of the whole, in bounded memory."""
 
 import json
 import subprocess
 import sys
 import tempfile
-import zipfile
 
 import numpy as np
 import polars
@@ -13,11 +12,8 @@ import pytest
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from small_session import rejected
-from trihedron import _core
-from trihedron.api import identifying, streaming
+from trihedron.api import streaming
 from trihedron.cli import main
-from trihedron.files import checkpoint as kept_file
-from trihedron.files.checkpoint import Checkpoint
 from trihedron.read.on_disk import log_on_disk
 
 COLUMNS = "ax,ay,az,gx,gy,gz"
@@ -69,21 +65,11 @@ def test_a_log_on_disk_is_calibrated_as_the_whole_is(whole, path):
     np.testing.assert_allclose(found.gyroscope.S, wanted.gyroscope.S, rtol=0, atol=1e-9)
 
 
-def test_corrected_readings_are_those_of_the_whole_and_a_stopped_run_goes_on(whole, path, tmp_path, monkeypatch):
+def test_corrected_readings_are_those_of_the_whole(whole, path, tmp_path, monkeypatch):
     monkeypatch.setattr(streaming, "PIECE_ROWS", 1000)
     calibration = trihedron.calibrate(whole, gravity_m_s2=G)
     out = tmp_path / "si.npy"
-
-    def stop(fraction, _text):
-        if fraction > 0.5:
-            raise Stopped
-
-    with pytest.raises(Stopped):
-        streaming.apply_file(calibration, opened(path), out, progress=stop)
-    assert not out.exists()
-    assert 0 < json.loads((tmp_path / "si.npy.part.json").read_text())["rows"] < whole.n_samples
-    written = streaming.apply_file(calibration, opened(path), out)
-    assert written < 0.5 * whole.n_samples
+    assert streaming.apply_file(calibration, opened(path), out) == whole.n_samples
     si = np.load(out)
     wanted = trihedron.apply(calibration, whole)
     np.testing.assert_array_equal(si[:, 1:4], wanted.accelerometer)
@@ -160,87 +146,3 @@ def test_a_text_with_decimal_commas_missing_fields_and_a_byte_order_mark_is_read
     np.testing.assert_array_equal(held.accelerometer[0:3], [[1.5, 2, 3], [-4, np.nan, 6], [np.nan, 8, 9]])
     del held
     assert list(tmp_path.iterdir()) == [log]
-
-
-class Stopped(Exception):
-    pass
-
-
-def test_the_noise_of_a_long_log_goes_on(path, tmp_path, monkeypatch):
-    monkeypatch.setattr(kept_file, "EVERY_S", 0.0)
-    monkeypatch.setattr(Checkpoint.__init__, "__defaults__", (0.0,))
-    monkeypatch.setattr(identifying, "IN_MEMORY_BYTES", 0)
-    monkeypatch.setattr(identifying.open_chunks(path, COLUMNS).__class__.chunks, "__defaults__", (2000, 0))
-    kept = tmp_path / "pass"
-    wanted = identifying.noise_of_file(path, columns=COLUMNS, rate_hz=100.0)
-    keep, left = Checkpoint.keep, [2]
-
-    def stopped(self, rows, state):
-        """As if killed right after the checkpoint was written for the second time."""
-        keep(self, rows, state)
-        left[0] -= 1
-        if not left[0]:
-            raise Stopped
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Checkpoint, "keep", stopped)
-        with pytest.raises(Stopped):
-            identifying.noise_of_file(path, columns=COLUMNS, rate_hz=100.0, checkpoint=kept)
-    with pytest.raises(ValueError, match="other columns, units or rate"):
-        identifying.noise_of_file(path, columns=COLUMNS, rate_hz=200.0, checkpoint=kept)
-    found = identifying.noise_of_file(path, columns=COLUMNS, rate_hz=100.0, checkpoint=kept)
-    np.testing.assert_array_equal(found.curve.deviation, wanted.curve.deviation)
-    assert not kept.exists()
-
-
-def test_a_file_that_is_no_checkpoint_is_left_alone(path, tmp_path):
-    kept = tmp_path / "precious.txt"
-    packed = tmp_path / "packed.npz"
-    np.savez_compressed(packed, made_of=np.array("x"), rows=np.array(3))
-    kept.write_text("years of work")
-    with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
-        archive.writestr("a", "b")
-    for other in (kept, packed, tmp_path / "other.zip", tmp_path):
-        before = other.read_bytes() if other.is_file() else None
-        with pytest.raises(ValueError, match="no checkpoint and was left alone"):
-            streaming.segment_file(opened(path), checkpoint=other)
-        assert before is None or other.read_bytes() == before
-
-
-def test_the_commands_keep_and_go_on(path, tmp_path, capsys):
-    log = [str(path), "--columns", COLUMNS, "--rate", "100"]
-    assert "--checkpoint belongs to --stream" in rejected(capsys, "segment", *log, "--checkpoint", tmp_path / "p")
-    # Killed in the midst of a pass, then run again: what is printed is what one run prints.
-    killed = (
-        "import os, sys\nfrom trihedron.files.checkpoint import Checkpoint\nfrom trihedron.api import streaming\n"
-        "from trihedron.cli import main\nstreaming.PIECE_ROWS = 700\nkeep = Checkpoint.keep\n"
-        "def once(self, rows, state):\n    self.every_s = 0.0\n    keep(self, rows, state)\n    os._exit(9)\n"
-        "Checkpoint.keep = once\nmain(sys.argv[1:])\n"
-    )
-    kept = tmp_path / "pass"
-    said = ["segment", *log, "--stream", "--checkpoint", str(kept)]
-    done = subprocess.run([sys.executable, "-c", killed, *said], capture_output=True)
-    assert done.returncode == 9
-    assert kept.exists()
-    status = main(said)
-    with_it = capsys.readouterr().out
-    assert not kept.exists()
-    assert main(said[:-2]) == status
-    assert capsys.readouterr().out == with_it
-
-
-def test_the_state_of_another_stream_is_refused():
-    stream = _core.AllanStream(1, [1, 2, 100000], _core.AllanStream.LEAST_BUDGET)
-    stream.extend(np.arange(300.0)[:, None])
-    state = stream.state()
-    for other in (
-        _core.AllanStream(1, [1, 2, 3], _core.AllanStream.LEAST_BUDGET),
-        _core.AllanStream(2, [1, 2, 100000], _core.AllanStream.LEAST_BUDGET),
-    ):
-        with pytest.raises(ValueError, match="state"):
-            other.restore(state)
-    numbers, fine, window, sums = state[0]
-    own = _core.AllanStream(1, [1, 2, 100000], _core.AllanStream.LEAST_BUDGET)
-    for bad in (np.full(6, np.nan), numbers[:5], numbers + np.eye(6)[3], numbers * (1 + 2 * np.eye(6)[4])):
-        with pytest.raises(ValueError, match="state"):
-            own.restore([(bad, fine, window, sums)])

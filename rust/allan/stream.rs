@@ -171,61 +171,6 @@ impl Stream {
         self.window_start += starts;
     }
 
-    /// The state for [`Stream::restore`]: scalars (centre, running sum and its remainder, readings, stride, start of
-    /// the window), sums of the fine clusters with their remainders, window, kept running sums.
-    #[must_use]
-    pub fn state(&self) -> [Vec<f64>; 4] {
-        let (n, stride, start) = (self.n as f64, self.stride as f64, self.window_start as f64);
-        [
-            vec![self.centre, self.total.0, self.total.1, n, stride, start],
-            self.fine.iter().flat_map(|&(s, e)| [s, e]).collect(),
-            self.window.clone(),
-            self.kept.clone(),
-        ]
-    }
-
-    /// Continues from the state of a stream of the same clusters and budget.
-    ///
-    /// # Errors
-    /// `BadInput` when the state is of another stream, or damaged.
-    pub fn restore(&mut self, [numbers, fine, window, kept]: [Vec<f64>; 4]) -> Result<()> {
-        // Counts that were stored as floats: exact below 2⁵³, and checked.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let whole = |v: f64| (v >= 0.0 && v.fract() == 0.0 && v < 9e15).then_some(v as usize);
-        let counted =
-            <[f64; 6]>::try_from(numbers)
-                .ok()
-                .and_then(|[centre, sum, rest, n, stride, start]| {
-                    Some((
-                        centre,
-                        (sum, rest),
-                        whole(n)?,
-                        whole(stride)?,
-                        whole(start)?,
-                    ))
-                });
-        let Some((centre, total, n, stride, window_start)) = counted else {
-            return Err(Error::bad_input(
-                "the numbers of a stream's state are damaged",
-            ));
-        };
-        let fits = fine.len() == 2 * self.n_fine
-            && stride.is_power_of_two()
-            && kept.len() == n / stride + 1
-            && kept.len() <= self.budget + 1
-            && (window.is_empty() || window_start + window.len() == n + 1);
-        if !fits {
-            return Err(Error::bad_input(
-                "this is the state of a stream of other clusters or another budget",
-            ));
-        }
-        (self.centre, self.total, self.n) = (centre, total, n);
-        (self.stride, self.window_start) = (stride, window_start);
-        self.fine = fine.chunks_exact(2).map(|p| (p[0], p[1])).collect();
-        (self.window, self.kept) = (window, kept);
-        Ok(())
-    }
-
     /// The curve of all readings so far.
     ///
     /// # Errors

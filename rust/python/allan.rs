@@ -1,8 +1,7 @@
 //! Bindings of the Allan variances.
 
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
-    PyUntypedArrayMethods, ToPyArray,
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -250,44 +249,6 @@ impl AllanStream {
             super::run_long(py, || {
                 channels.iter_mut().enumerate().try_for_each(|(c, stream)| stream.extend(&v.channel(c)))
             })
-        })
-    }
-
-    /// Four arrays per channel from which `restore` continues.
-    fn state<'py>(&self, py: Python<'py>) -> Vec<[Bound<'py, PyArray1<f64>>; 4]> {
-        self.channels
-            .iter()
-            .map(|stream| stream.state().map(|part| part.into_pyarray(py)))
-            .collect()
-    }
-
-    /// Continues from the `state` of a stream of the same clusters, budget and number of channels.
-    fn restore(
-        &mut self,
-        py: Python<'_>,
-        state: Vec<[PyReadonlyArray1<'_, f64>; 4]>,
-    ) -> PyResult<()> {
-        if state.len() != self.channels.len() {
-            return Err(PyValueError::new_err(format!(
-                "the stream has {} channels, this state {}",
-                self.channels.len(),
-                state.len()
-            )));
-        }
-        let state: Vec<[Vec<f64>; 4]> = state
-            .iter()
-            .map(|parts| {
-                parts
-                    .each_ref()
-                    .map(|part| part.as_array().iter().copied().collect())
-            })
-            .collect();
-        let channels = &mut self.channels;
-        super::run(py, || {
-            channels
-                .iter_mut()
-                .zip(state)
-                .try_for_each(|(stream, parts)| stream.restore(parts))
         })
     }
 

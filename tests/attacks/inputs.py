@@ -48,7 +48,6 @@ def _readers() -> dict[str, list[Callable[[Path], object]]]:
     from trihedron.files.noise import read_noise
     from trihedron.files.scenario import improved_scenario
     from trihedron.protocols.declared import read_frame_declaration
-    from trihedron.read.allan_table import read_allan_table
     from trihedron.read.axis_noise import read_axis_noise
     from trihedron.read.pose_table import read_pose_table
     from trihedron.simulate.scenario_file import read_scenario
@@ -69,7 +68,6 @@ def _readers() -> dict[str, list[Callable[[Path], object]]]:
         "s.toml": [read_scenario, lambda path: improved_scenario(path, {}, [("dropped-samples", {"rate": 0.1})])],
         "frame.toml": [read_frame_declaration],
         "poses.csv": [lambda path: read_pose_table(path, gravity_m_s2=9.8)],
-        "curve.csv": [read_allan_table],
     }
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,15 +13,11 @@ import numpy.typing as npt
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.errors import InputError
-from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.grid import readings_of, scale_of, temperature_of
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
-from trihedron.files.checkpoint import Checkpoint, made_of
-from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
-from trihedron.read.errors import ReadError
 from trihedron.records import Calibration, Finding, Noise, Recording, TermName
 from trihedron.sensor_model import axis_scales
 from trihedron.units import AccelerationUnit, RateUnit
@@ -127,15 +122,13 @@ def noise_of_file(
     gyroscope_lsb: str | None = None,
     exclude_s: Sequence[tuple[float, float]] = (),
     automatic: bool = True,
-    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Noise:
     """Noise of a .npy, Parquet or text log of any size in bounded memory; its columns are as given, not detected.
 
     Up to half a gigabyte the log is read whole; beyond, in one pass (:func:`stream_noise`) that excludes no
-    disturbance. With ``checkpoint`` that file stores the state of the pass every half a minute; an interrupted run
-    continues from it with bit-identical results, and the end removes it.
+    disturbance.
 
-    Raises ``InputError`` when file, columns, excluded intervals, LSBs or ``checkpoint`` do not match.
+    Raises ``InputError`` when file, columns, excluded intervals or LSBs do not match.
     """
     log = open_chunks(Path(path), columns)
     stated = {"g": (gyroscope_unit, gyroscope_lsb), "a": (accelerometer_unit, accelerometer_lsb)}
@@ -160,52 +153,8 @@ def noise_of_file(
         )
     if exclude_s:
         raise InputError(f"{path}: nothing can be excluded from a log that is read in one pass; cut the file instead.")
-    kept_in = None if checkpoint is None else Path(checkpoint)
-    kept = Checkpoint(kept_in, made_of(log.path, "allan", rate_hz, log.roles, factor))
-    done, state = kept.load()
-
-    def parts() -> Iterator[npt.NDArray[np.float64]]:
-        for part in log.chunks(first=done):
-            yield scaled(part)
-
-    found = stream_noise(
-        parts(), rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path), state=state,
-        keep=kept.keep,
-    )  # fmt: skip
-    kept.remove()
-    return found
-
-
-def noise_of_curve(
-    path: str | os.PathLike[str],
-    *,
-    rate_hz: float | None = None,
-    n_samples: int | None = None,
-    accelerometer_unit: str | AccelerationUnit | None = None,
-    gyroscope_unit: str | RateUnit | None = None,
-) -> Noise:
-    """Noise terms from a table of Allan deviations, without its log (docs/noise.md, section 5).
-
-    ``rate_hz`` and ``n_samples`` are those of the log behind the curve, where the table does not state them. Channels
-    whose names begin with ``g`` or ``a`` have the unit given for the gyro or the accelerometer.
-
-    Raises ``InputError`` when the table is not recognised, too short, or does not state the log's rate and length.
-    """
-    table = read_allan_table(Path(path))
-    rate, length = rate_hz or table.rate_hz, n_samples or table.n_samples
-    if rate is None or length is None:
-        missing = " and ".join(
-            w for w, v in (("rate (--rate HZ)", rate), ("length (--samples N)", length)) if v is None
-        )
-        raise ReadError(f"{path}: the table does not state the log's {missing}; how certain a point is depends on it.")
-    deviation, units = table.deviation.copy(), list(table.units)
-    given: dict[str, Any] = {"g": (gyroscope_unit, RateUnit), "a": (accelerometer_unit, AccelerationUnit)}
-    for c, name in enumerate(table.names):
-        unit, kind = given.get(name[:1].lower(), (None, ()))
-        if unit or units[c] in {one.value for one in kind}:
-            _, scale, units[c] = scale_of(name[:1].lower(), unit or units[c], None)
-            deviation[:, c] *= scale
-    return identify_curve(table.tau_s, deviation, rate, length, names=table.names, units=tuple(units), source=str(path))
+    parts = (scaled(part) for part in log.chunks())
+    return stream_noise(parts, rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path))
 
 
 def recording_lengths(noise: Noise, relative: float) -> dict[str, dict[TermName, float | None]]:

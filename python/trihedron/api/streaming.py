@@ -6,7 +6,7 @@ ends of poses (:func:`calibrate_file`), or one piece (:func:`apply_file`). See d
 
 from __future__ import annotations
 
-import json
+import io
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -18,8 +18,7 @@ from trihedron.api.applying import AnyCalibration, calibration_of, check_units
 from trihedron.api.calibrating import calibrate
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.files.calibration import calibration_text
-from trihedron.files.checkpoint import Checkpoint, made_of
+from trihedron.files.output import Temporary
 from trihedron.ranges import merged
 from trihedron.read.on_disk import LogOnDisk, Triad
 from trihedron.records import Move, Pose, Recording, Segments
@@ -34,51 +33,29 @@ KEPT_S = 60.0
 standard error of the mean remain those of the whole pose."""
 
 
-def segment_file(
-    log: LogOnDisk, *, checkpoint: str | os.PathLike[str] | None = None, progress: Progress | None = None
-) -> Segments:
-    """Poses and moves of a log on disk: equal to those of :func:`trihedron.segment` on the whole log.
-
-    With ``checkpoint`` a file stores the state of the pass every half a minute; an interrupted run continues from it
-    with bit-identical results, and the end removes it.
-
-    Raises ``InputError`` when ``checkpoint`` is a file of another kind.
-    """
+def segment_file(log: LogOnDisk, *, progress: Progress | None = None) -> Segments:
+    """Poses and moves of a log on disk: equal to those of :func:`trihedron.segment` on the whole log."""
     notify = progress or (lambda _fraction, _text: None)
     # The segmentation only reads rows, which these types support.
     view = cast("Recording", log)
     sums = BlockSums(view)
     width = sums.length * max(1, PIECE_ROWS // sums.length)
-    path = None if checkpoint is None else Path(checkpoint)
-    kept = Checkpoint(path, made_of(log.log.path, "blocks", log.rate_hz, log.log.roles))
-    done, state = kept.load()
-    if done:
-        sums.restore(done, state)
-    for part in log.log.chunks(width, done):
+    done = 0
+    for part in log.log.chunks(width):
         triads = [part[:, t.first : t.first + 3] for t in (log.accelerometer, log.gyroscope) if t is not None]
         sums.add([np.ascontiguousarray(t, dtype=np.float64) for t in triads])
         done += len(part)
         notify(0.8 * done / log.n_samples, f"{done} of {log.n_samples} rows")
-        kept.keep(done, sums.state)
-    segments = segment_blocks(view, sums.channels(), progress=lambda f, text: notify(0.8 + 0.2 * f, text))
-    kept.remove()
-    return segments
+    return segment_blocks(view, sums.channels(), progress=lambda f, text: notify(0.8 + 0.2 * f, text))
 
 
-def calibrate_file(
-    log: LogOnDisk,
-    *,
-    checkpoint: str | os.PathLike[str] | None = None,
-    progress: Progress | None = None,
-    **options: Any,
-) -> CalibrationResult:
+def calibrate_file(log: LogOnDisk, *, progress: Progress | None = None, **options: Any) -> CalibrationResult:
     """Calibrate a log on disk from the statistics of its poses and the rows of its moves; options as for ``calibrate``.
 
-    ``checkpoint`` as in :func:`segment_file`, whose pass over the log takes most of the time. The result is that of
-    :func:`trihedron.calibrate` on the whole log, if no pose is longer than two minutes.
+    The result is that of :func:`trihedron.calibrate` on the whole log, if no pose is longer than two minutes.
     """
     notify = progress or (lambda _fraction, _text: None)
-    segments = segment_file(log, checkpoint=checkpoint, progress=lambda f, text: notify(0.7 * f, text))
+    segments = segment_file(log, progress=lambda f, text: notify(0.7 * f, text))
     recording, shown = condensed(log, segments)
     notify(0.8, f"fitting {recording.n_samples} of {log.n_samples} rows")
     return calibrate(recording, segments=shown, **options)
@@ -150,9 +127,7 @@ def apply_file(
     progress: Progress | None = None,
 ) -> int:
     """Correct a log on disk piece by piece into a .npy file (n, 4 or 7): time [s], specific force, angular rate.
-
-    An interrupted run continues where it stopped: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` has the number of rows
-    and a hash of the inputs. Returns the number of rows written in this run.
+    Returns the number of rows.
 
     Raises ``InputError`` when the calibration depends on temperature or has effects, which are not supported here;
     when units differ; when the output exists.
@@ -171,36 +146,15 @@ def apply_file(
     if not used:
         raise InputError(f"{log.source}: the calibration contains none of its sensors.")
     shape = (log.n_samples, 1 + 3 * len(used))
-    part, note, next_note = (Path(f"{target}{ending}") for ending in (".part", ".part.json", ".part.json.new"))
-    of = made_of(log.log.path, log.rate_hz, log.log.roles, shape, calibration_text(known))
-    done = _rows_done(part, note, of)
-    if done == 0:
-        np.lib.format.open_memmap(part, mode="w+", dtype=np.float64, shape=shape).flush()
-    header = part.stat().st_size - 8 * shape[0] * shape[1]
-    written = 0
-    with part.open("r+b") as stream:
-        for start in range(done, log.n_samples, PIECE_ROWS):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    with Temporary(Path(os.path.realpath(target))) as temporary:
+        temporary.write(header.getvalue())
+        for start in range(0, log.n_samples, PIECE_ROWS):
             rows = slice(start, min(start + PIECE_ROWS, log.n_samples))
             columns = [log.time_s[rows][:, None], *(correct(t[rows], s.S, s.b) for t, s in used)]
-            stream.seek(header + 8 * start * shape[1])
-            stream.write(np.hstack(columns).tobytes())
-            stream.flush()
-            written += rows.stop - start
-            # Replaced atomically: a run that is killed here leaves the previous note.
-            next_note.write_text(json.dumps({"made_of": of, "rows": rows.stop}))
-            next_note.replace(note)
+            temporary.write(np.hstack(columns).astype("<f8").tobytes())
             if progress is not None:
                 progress(rows.stop / log.n_samples, f"{rows.stop} of {log.n_samples} rows")
-        os.fsync(stream.fileno())
-    part.replace(target)
-    note.unlink(missing_ok=True)
-    next_note.unlink(missing_ok=True)
-    return written
-
-
-def _rows_done(part: Path, note: Path, of: str) -> int:
-    try:
-        said = json.loads(note.read_text())
-    except (OSError, ValueError):
-        return 0
-    return int(said["rows"]) if said.get("made_of") == of and part.exists() else 0
+        temporary.put_in_place(None, overwrite=overwrite)
+    return log.n_samples

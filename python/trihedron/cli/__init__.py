@@ -18,7 +18,7 @@ from pathlib import Path
 import typer
 
 from trihedron.cli.help import WIDEST, Command, Group
-from trihedron.cli.output import say, silence, spell_out
+from trihedron.cli.output import say, silence
 from trihedron.cli.run import begin, with_commands
 from trihedron.errors import InputError
 from trihedron.interruption import SAID, SENTENCE, Interrupted, status_of
@@ -75,7 +75,6 @@ def trihedron(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status; an input error gives one sentence, never a traceback."""
     words = _with_stdout_as_default(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
-    spell_out()
     begin(words)
     try:
         _make_writable()
@@ -127,7 +126,7 @@ class _Closed(io.TextIOBase):
 
 
 def _make_writable() -> None:
-    """Make stdout and stderr accept any text: file names may have characters that the terminal's encoding lacks."""
+    """Make stdout and stderr accept any text: UTF-8 also in a pipe of Windows, and names of files of any bytes."""
     if sys.stdout is None:
         sys.stdout = _Closed()
     if sys.stderr is None:
@@ -135,7 +134,7 @@ def _make_writable() -> None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+            stream.reconfigure(encoding="utf-8", errors="backslashreplace")
 
 
 def _memory_sentence() -> str:

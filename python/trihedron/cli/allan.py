@@ -9,7 +9,6 @@ import typer
 
 from trihedron.cli.options import LogSource, progress, with_options
 from trihedron.cli.output import FullResults, is_stdout, leave, say
-from trihedron.cli.streamed import needs_stream
 from trihedron.files.output import write_whole
 
 if TYPE_CHECKING:
@@ -28,8 +27,6 @@ OPTIONS = {
     "accuracy": ("PERCENT", "With --full: how long to record for this uncertainty of each term."),
     "plot": ("FILE.png", "Draw the Allan curves (also in the report)."),
     "csv": ("FILE", "Write the Allan curve as a table."),
-    "curve": "LOG is a table of Allan deviations (--csv of another run, or published): terms from it.",
-    "samples": ("N", "Readings of the log behind --curve, where the table is silent."),
     "stream": "Read a .npy, Parquet or CSV log in pieces, in at most 1.5 GB and without audit: --columns, --rate and "
     "the units state what it contains.",
     "full": "Print customary units, how long to record and Kalibr's names as well.",
@@ -48,10 +45,7 @@ def allan(
     accuracy: float = 10.0,
     plot: Path | None = None,
     csv: Path | None = None,
-    curve: bool = False,
-    samples: int | None = None,
     stream: bool = False,
-    checkpoint: Path | None = None,
     results: FullResults,
 ) -> None:
     """Identify the noise terms of a long static log: how large, how certain, how long to average."""
@@ -59,17 +53,11 @@ def allan(
     if not 0.0 < accuracy < 1000.0:
         raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
     results.check(csv, plot, inputs=(*source.files, calibration))
-    if calibration is not None and (curve or stream):
-        raise typer.BadParameter("--calibration goes with a log that is read whole: no --curve, no --stream")
-    needs_stream(checkpoint, stream=stream)
-    if curve:
-        if exclude or stream or keep_events:
-            raise typer.BadParameter("--curve has no log: --exclude, --keep-events and --stream do not go with it")
-        found = _of_curve(source, samples, gyro_lsb, accel_lsb)
-    else:
-        options: dict[str, Any] = {"exclude_s": intervals, "automatic": not keep_events}
-        options |= {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb}
-        found = _of_file(source, checkpoint, options) if stream else _of_log(source, calibration, options)
+    if calibration is not None and stream:
+        raise typer.BadParameter("--calibration goes with a log that is read whole: no --stream")
+    options: dict[str, Any] = {"exclude_s": intervals, "automatic": not keep_events}
+    options |= {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb}
+    found = _of_file(source, options) if stream else _of_log(source, calibration, options)
     from trihedron.api.identifying import recording_lengths
     from trihedron.report.noise import all_findings, noise_report
     from trihedron.report.noise_files import curve_csv, noise_record
@@ -100,25 +88,13 @@ def _of_log(source: LogSource, calibration: Path | None, options: dict[str, Any]
         return identified(recording, calibration=calibration, **options)
 
 
-def _of_file(source: LogSource, checkpoint: Path | None, options: dict[str, Any]) -> Noise:
+def _of_file(source: LogSource, options: dict[str, Any]) -> Noise:
     from trihedron.api.identifying import noise_of_file
 
     if source.log is None or source.columns is None or source.rate is None:
         raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
     with progress("identifying"):
-        options |= {"checkpoint": checkpoint, **source.units}
-        return noise_of_file(source.log, columns=source.columns, rate_hz=source.rate, **options)
-
-
-def _of_curve(source: LogSource, samples: int | None, gyro_lsb: str | None, accel_lsb: str | None) -> Noise:
-    from trihedron.api.identifying import noise_of_curve
-
-    if source.log is None:
-        raise typer.BadParameter("--curve needs the table in the place of LOG")
-    if gyro_lsb or accel_lsb:
-        raise typer.BadParameter("--curve has no counts: say the unit of the deviations with --gyro-unit, --accel-unit")
-    with progress("identifying"):
-        return noise_of_curve(source.log, rate_hz=source.rate, n_samples=samples, **source.units)
+        return noise_of_file(source.log, columns=source.columns, rate_hz=source.rate, **source.units, **options)
 
 
 def _interval(text: str) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from trihedron.cli.options import (
     with_options,
 )
 from trihedron.cli.output import FullResults
-from trihedron.cli.streamed import calibrate_stream, needs_stream
+from trihedron.cli.streamed import calibrate_stream
 
 FIRST_SCREEN = 2
 OPTIONS = {
@@ -65,7 +65,6 @@ def calibrate(
     reference_columns: str | None = None,
     extended: bool = False,
     stream: bool = False,
-    checkpoint: Path | None = None,
     by: str | None = None,
     labels: str | None = None,
     output: Path | None = None,
@@ -76,7 +75,6 @@ def calibrate(
     Several logs of one unit give common parameters and the repeatability of each.
     """
     results.check(output, inputs=sources.files)
-    needs_stream(checkpoint, stream=stream)
     choices: dict[str, Any] = {
         "method": one_of("--method", method, ("joint", "separate", "faces")),
         "frame": None if frame is None else one_of("--frame", frame, ("lower", "symmetric", "case")),
@@ -105,7 +103,7 @@ def calibrate(
     if labels is not None and not stream:
         raise typer.BadParameter("--labels belong to several logs")
     if stream:
-        result = calibrate_stream(sources.one(), place, choices, checkpoint)
+        result = calibrate_stream(sources.one(), place, choices)
     else:
         choices |= {"reference": _only(reference), "reference_columns": reference_columns}
         result = _calibrated(sources, place, choices, extended=extended)

@@ -12,7 +12,6 @@ import typer
 
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, one_of, progress
 from trihedron.cli.output import FullResults
-from trihedron.cli.run import note_excluded
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
@@ -85,7 +84,6 @@ def calibrate_many(
             progress=notify,
             **place.said,
         )
-    note_excluded((name for name, _ in result.model.left_out), given)
     document = sessions_report(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."
     machine = partial(sessions_record, result.model)

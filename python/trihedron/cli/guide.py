@@ -101,7 +101,7 @@ def finish(
     result, check = conclude(recording, cut_s, **place.said)
     note_file(output)
     laid_out = calibration_report(result.calibration, result.segments, result.recording)
-    put(to_text(with_arguments(laid_out, "trihedron calibrate LOG"), sections=2, style=style()))
+    put(to_text(with_arguments(laid_out), sections=2, style=style()))
     findings = list(result.calibration.findings)
     if check is not None:
         note_file(output or Path(UNSTORED))

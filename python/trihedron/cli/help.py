@@ -18,7 +18,7 @@ COMMAND_GROUPS: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 _OF_THE_LOG = (
     *("accel", "gyro", "columns", "rate", "accel_unit", "gyro_unit", "time_unit", "topic", "instance"),
-    *("gyro_lsb", "accel_lsb", "samples", "stream", "curve", "exclude", "keep_events"),
+    *("gyro_lsb", "accel_lsb", "stream", "exclude", "keep_events"),
 )
 _OF_OUTPUT = ("output", "json", "report", "full", "force", "csv", "plot", "updated", "improved", "truth", "every")
 OPTION_GROUPS: tuple[tuple[str, frozenset[str]], ...] = (

@@ -32,7 +32,6 @@ SHARED: Table = {
     "reference_columns": ("LIST", "Its columns: 't,qw,qx,qy,qz,px [m]', 't,wx [deg/s],...'."),
     "stream": "A .npy, Parquet or CSV log larger than memory, in pieces and without audit: --columns, --rate and the "
     "units state the content. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
-    "checkpoint": ("FILE", "With --stream: store the progress in FILE, so that a stopped run continues from there."),
 }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import contextlib
 import errno
 import os
@@ -150,7 +149,7 @@ def is_stdout(target: Path | None) -> bool:
 
 
 def style() -> Style:
-    """Style for stdout: the terminal's columns, colour on a terminal without NO_COLOR, ASCII where needed.
+    """Style for stdout: the terminal's columns, colour on a terminal without NO_COLOR.
 
     A pipe has the width of a file; ``COLUMNS`` overrides both.
     """
@@ -159,7 +158,7 @@ def style() -> Style:
     is_terminal = sys.stdout.isatty()
     is_said = os.environ.get("COLUMNS", "").isdigit()
     width = shutil.get_terminal_size((WIDTH, 24)).columns if is_terminal or is_said else WIDTH
-    return Style(width, has_colour(), not speaks_unicode(sys.stdout))
+    return Style(width, has_colour())
 
 
 def has_colour() -> bool:
@@ -226,34 +225,3 @@ def leave(findings: Iterable[Finding], *, is_shown: bool = False) -> None:
         if not is_shown and reasons[0].action:
             say(f"→ {with_commands(reasons[0].action)}")
         raise typer.Exit(NOT_TO_BE_TRUSTED)
-
-
-# Streams in ASCII or a Windows code page: unsupported characters are spelt out.
-
-ERRORS = "trihedron-ascii"
-_SAMPLE = "′±²→─σ"
-
-
-def speaks_unicode(stream: TextIO) -> bool:
-    """Whether the stream's encoding has the characters of a report."""
-    try:
-        _SAMPLE.encode(getattr(stream, "encoding", None) or "utf-8")
-    except (UnicodeEncodeError, LookupError):
-        return False
-    return True
-
-
-def spell_out() -> None:
-    """Make stdout and stderr write characters that they cannot encode in ASCII: ``σ`` as ``sigma``."""
-    codecs.register_error(ERRORS, _spelt)
-    for stream in (sys.stdout, sys.stderr):
-        if not speaks_unicode(stream) and hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors=ERRORS)
-
-
-def _spelt(error: UnicodeError) -> tuple[str, int]:
-    from trihedron.report.ascii import ascii_of
-
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    return ascii_of(error.object[error.start : error.end]), error.end

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import re
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timezone
@@ -16,17 +16,10 @@ if TYPE_CHECKING:
     from trihedron.records import Recording
     from trihedron.report.document import Block, Document
 
-_COMMAND = re.compile(r"`(?:trihedron |\.\.\. )[^`]+`")
-_NOT_AGAIN = ("--json", "--report", "--full", "--force", "--to", "-o", "--output", "--updated", "--improved")
-_OF_ITS_COMMAND = ("--alpha", "--by", "--labels", "--frame")
-_WITHOUT_VALUE = ("--full", "--force")
+_COMMAND = re.compile(r"`trihedron (\w+) [^`]+`")
 _WITH_PLACE = ("calibrate", "diagnose", "noise")
 """Commands that take the place of the recording and its reference; the others take gravity from the calibration."""
-_NAMES_A_LOG = re.compile(r"^`trihedron \w+ (?!.*(\bLOG\b|\.\.\.|--(?!accel |gyro |instance )))")
-"""A command with one of several logs by its name: this place is also its own."""
 UNSTORED = "calibration.json"
-LONG = 100
-"""Characters of a command from which another option is named without it."""
 UNKNOWN_PLACE = "--latitude DEG"
 """Option of the next command where gravity was not given."""
 UNKNOWN_RATE = " --rate HZ"
@@ -40,18 +33,15 @@ _NOT_OPTIONS = {
 
 @dataclass
 class _Run:
-    """Arguments as typed, options in effect, inputs with their hashes; all logs; log, place, reference and file of the
-    next step, and logs that were excluded."""
+    """Arguments as typed, options in effect, inputs with their hashes; log, place, reference, file of what is next."""
 
     typed: tuple[str, ...] = ()
     options: dict[str, Any] = field(default_factory=dict)
     inputs: list[tuple[str, str]] = field(default_factory=list)
-    logs: list[list[str]] = field(default_factory=list)
     log: str = "LOG"
     place: str = ""
     beside: str = ""
     file: str = ""
-    excluded: tuple[str, ...] = ()
 
 
 _run: ContextVar[_Run] = ContextVar("run")
@@ -83,8 +73,7 @@ def note_input(recording: Recording) -> None:
 
 
 def note_log(source: Any) -> None:
-    """Store a log that was read, and the first with the options that say how to read it."""
-    _now().logs.append(_words(source))
+    """Store the first log that was read, with the options that say how to read it."""
     if _now().log == "LOG":
         name_log(source)
 
@@ -110,14 +99,6 @@ def note_file(path: Path | None) -> None:
     _now().file = "" if path is None else shlex.quote(str(path))
 
 
-def note_excluded(logs: Iterable[str], sources: Iterable[Any]) -> None:
-    """Store the logs, as typed, that were not used of several: the next step is without them."""
-    _now().excluded = tuple(logs)
-    used = [one for one in sources if str(one.log) not in _now().excluded]
-    if _now().excluded and used:
-        name_log(used[0])
-
-
 def _words(source: Any) -> list[str]:
     """The fields of a group of options as arguments; the log, which has no flag, first."""
     given = {f.name: getattr(source, f.name) for f in fields(source)}
@@ -130,32 +111,26 @@ def _word(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else _near(str(value))
 
 
-def with_arguments(document: Document, stored_by: str = "...") -> Document:
-    """The document with LOG, FILE and ``...`` (the same command, or its arguments for another one) in what is next,
-    and in the actions of findings, replaced by those of this run; where nothing was stored, ``stored_by`` is the
-    command that does."""
-
-    said, what_next = document.next_step, document.what_next
+def with_arguments(document: Document) -> Document:
+    """The document with LOG and FILE in what is next, and in the actions of findings, replaced by those of this run;
+    a calibration that was not stored is stored first."""
     if any(one.code == "gravity-defaulted" for one in document.findings):
         _now().place = UNKNOWN_PLACE
     if any(one.code == "rate-assumed" for one in document.findings) and UNKNOWN_RATE not in _now().log:
         _now().log += UNKNOWN_RATE
+    what_next = document.what_next
     if not _now().file:
         what_next = what_next.replace("-o FILE --force", "-o FILE")
-        if "-o FILE" not in what_next and re.search(r"\bFILE\b", " ".join(_COMMAND.findall(said))):
-            is_long = stored_by == "..." and len(again(_now().typed)) > LONG
-            option = f"-o {UNSTORED}"
-            is_added = f": add `{option}` to this `{(*_now().typed, '')[0]}` command"
-            how = is_added if is_long else f" (`{stored_by} {option}`)"
-            said = f"Store {'S and b' if len(_now().logs) > 1 else 'it'}{how}. {said}"
-            what_next = replace(document, next_step=said).what_next
+        if "-o FILE" not in what_next and re.search(r"`trihedron [^`]*\bFILE\b", document.next_step):
+            stored = f"Store it: add `-o {UNSTORED}` to this command. {document.next_step}"
+            what_next = replace(document, next_step=stored).what_next
     sections = tuple(replace(one, blocks=tuple(map(_with_actions, one.blocks))) for one in document.sections)
     return replace(document, next_step=with_commands(what_next), sections=sections)
 
 
 def with_commands(text: str) -> str:
     """The text with its commands for the log of this run."""
-    return _COMMAND.sub(lambda found: _filled(found[0]), text)
+    return _COMMAND.sub(lambda found: _filled(found[0], found[1]), text)
 
 
 def _with_actions(block: Block) -> Block:
@@ -168,36 +143,10 @@ def _with_actions(block: Block) -> Block:
     )
 
 
-def _filled(command: str) -> str:
-    verb = command.strip("`").split(" ")[1]
+def _filled(command: str, verb: str) -> str:
     more = (_now().beside, _now().place) if verb in _WITH_PLACE else ()
-    log = " ".join(filter(None, (_now().log, *more)))
-    given = [word for word in _now().typed if word not in _now().excluded]
-    if verb in _WITH_PLACE and _NAMES_A_LOG.search(command):
-        named = shlex.split(command.strip("`"))[2:]
-        read = next((words for words in _now().logs if {*named} <= {*words}), [])
-        options = shlex.join(word for word in read if word not in named)
-        return f"`{' '.join(filter(None, (command.strip('`'), options, _now().place)))}`"
-    is_own = any(word in _OF_ITS_COMMAND for word in given)
-    if re.fullmatch(r"`trihedron \w+ \.\.\.`", command) and len(again(given)) > LONG and not is_own:
-        return f"this command with `{verb}` in place of `{given[0]}`"
-    same = (
-        again(given) if command.startswith("`...") else " ".join(again(given, _NOT_AGAIN + _OF_ITS_COMMAND).split()[2:])
-    )
-    same += f" {UNKNOWN_PLACE}" if _now().place == UNKNOWN_PLACE else ""
-    words = {"LOG": log, "FILE": _now().file or UNSTORED, "...": same}
-    return re.sub(r"\bLOG\b|\bFILE\b|\.\.\.", lambda found: words[found[0]] or found[0], command)
-
-
-def again(given: Sequence[str], without: Sequence[str] = _NOT_AGAIN) -> str:
-    """The command as typed, without its outputs."""
-    words, skip = [], False
-    for word in given:
-        name = word.partition("=")[0]
-        if not skip and name not in without:
-            words.append(word)
-        skip = not skip and name in without and name not in _WITHOUT_VALUE and "=" not in word
-    return shlex.join(["trihedron", *words]) if words else ""
+    words = {"LOG": " ".join(filter(None, (_now().log, *more))), "FILE": _now().file or UNSTORED}
+    return re.sub(r"\bLOG\b|\bFILE\b", lambda found: words[found[0]], command)
 
 
 def with_provenance(document: Document) -> Document:

@@ -1,17 +1,14 @@
 """``trihedron segment``."""
 
-from pathlib import Path
-
 from trihedron.cli.options import LogSource, progress, with_options
 from trihedron.cli.output import Results, leave
-from trihedron.cli.streamed import needs_stream, opened
+from trihedron.cli.streamed import opened
 
 
 @with_options(source=LogSource, results=Results)
-def segment(source: LogSource, *, stream: bool = False, checkpoint: Path | None = None, results: Results) -> None:
+def segment(source: LogSource, *, stream: bool = False, results: Results) -> None:
     """Find the poses and the moves between them."""
     results.check(inputs=source.files)
-    needs_stream(checkpoint, stream=stream)
     from trihedron.report.machine import segments_record
     from trihedron.report.segments import segments_report
 
@@ -20,7 +17,7 @@ def segment(source: LogSource, *, stream: bool = False, checkpoint: Path | None 
         from trihedron.api.streaming import condensed, segment_file
 
         with progress("segmenting") as notify:
-            found = segment_file(log, checkpoint=checkpoint, progress=notify)
+            found = segment_file(log, progress=notify)
         # Figures and times are from the rows of moves and of the ends of poses.
         recording, segments = condensed(log, found)
     else:

@@ -15,12 +15,6 @@ if TYPE_CHECKING:
     from trihedron.records.results import CalibrationResult
 
 
-def needs_stream(checkpoint: Path | None, *, stream: bool) -> None:
-    """Check that a checkpoint is given only with ``--stream``."""
-    if checkpoint is not None and not stream:
-        raise typer.BadParameter("--checkpoint belongs to --stream")
-
-
 def opened(source: LogSource) -> LogOnDisk:
     """The log on disk; rejected where an option that streaming needs is missing."""
     if source.log is None or source.columns is None or source.rate is None:
@@ -32,15 +26,13 @@ def opened(source: LogSource) -> LogOnDisk:
         return log_on_disk(source.log, columns=source.columns, rate_hz=source.rate, **source.units)
 
 
-def calibrate_stream(
-    source: LogSource, place: GravitySource, options: dict[str, Any], checkpoint: Path | None
-) -> CalibrationResult:
+def calibrate_stream(source: LogSource, place: GravitySource, options: dict[str, Any]) -> CalibrationResult:
     """A calibration from a log on disk."""
     log = opened(source)
     from trihedron.api.streaming import calibrate_file
 
     with progress("calibrating") as notify:
-        return calibrate_file(log, checkpoint=checkpoint, progress=notify, **place.said, **options)
+        return calibrate_file(log, progress=notify, **place.said, **options)
 
 
 def apply_stream(calibration: Path, source: LogSource, output: Path, *, force: bool) -> None:
@@ -53,6 +45,5 @@ def apply_stream(calibration: Path, source: LogSource, output: Path, *, force: b
     known = read_calibration(calibration)
     with progress("applying") as notify:
         written = apply_file(known, log, output, overwrite=force, progress=notify)
-    went_on = "" if written == log.n_samples else f", {log.n_samples - written} of them by an earlier run"
-    say(f"{log.n_samples} samples{went_on}: {output}")
+    say(f"{written} samples: {output}")
     leave(doubted(known))

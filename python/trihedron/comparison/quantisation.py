@@ -49,7 +49,7 @@ def white_and_quantisation(axis: PoseNoise) -> WhiteAndQuantisation | None:
     """N² + 4 Q² rate sin²(πf/rate) fitted to the densities of the octaves, errors relative to the model.
 
     Rounding of an integral leaves the first difference over the time step of white noise of variance Q², with an Allan
-    variance of 3 Q²/τ² (docs/noise.md, 8).
+    variance of 3 Q²/τ² (docs/noise.md, 7).
     ``None`` where a low-pass filters the axis, or octaves are too few.
     """
     octaves = [o for o in axis.octaves if o.high_hz <= 0.5 * axis.rate_hz * (1.0 + 1e-9)]

@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.records.frozen import freeze
-from trihedron.records.presented import Presented
+from trihedron.records.frozen import Frozen, freeze
 
 AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 
@@ -19,7 +18,7 @@ _PER_CHANNEL = ("deviation", "n_terms", "weight", "edf", "lower", "upper")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AllanCurve(Presented):
+class AllanCurve(Frozen):
     """Allan deviations of one or more channels against averaging time. For a single series all arrays are (k,).
 
     Attributes

@@ -180,9 +180,9 @@ def _by_themselves(diagnosis: Diagnosis) -> str:
 def _taken_by(model: str) -> str:
     """The option that rewrites the model, or advice for a simulated log, whose source is unknown."""
     if model.endswith(".toml"):
-        return "`... --improved improved.toml` writes your scenario with them"
+        return "`--improved improved.toml` writes your scenario with them"
     if model.endswith(".json"):
-        return "`... --updated updated.json` writes the calibration of this log"
+        return "`--updated updated.json` writes the calibration of this log"
     # A simulated log has an ending; a ready-made scenario is a name.
     where = "your simulation, or in " if PurePath(model).suffix or not model else ""
     return (

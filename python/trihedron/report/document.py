@@ -26,7 +26,7 @@ _COMMAND = re.compile(r"`trihedron (\w+) LOG")
 THEN_RUN = {
     "not-observable": "Then record a new log and run this command on it.",
     "weakly-observable": "Then record a new log and run this command on it.",
-    "rate-assumed": "Run `... --rate HZ`.",
+    "rate-assumed": "Add `--rate HZ` to this command.",
     "filter-noise-uncalibrated": "Run `trihedron calibrate LOG -o calibration.json`, then `trihedron apply "
     "calibration.json LOG -o corrected.csv`, and give corrected.csv to `trihedron noise`.",
 }

@@ -20,7 +20,7 @@ OF_SENSOR = {
     "gyroscope": (degrees_from_radians(1.0), "°", "attitude error"),
     "accelerometer": (1.0, "m/s", "velocity error"),
 }
-NEXT = "Put these values into your filter: `... --to kalibr -o imu.yaml` (other targets: `trihedron noise --help`)."
+NEXT = "Put these values into your filter: add `--to kalibr -o imu.yaml` (other targets: `trihedron noise --help`)."
 OF_ONE = (
     "Put N and K of the table into your filter; for a file of both sensors (`trihedron noise --help`) give a reference "
     "with positions."

@@ -9,7 +9,7 @@ from trihedron.report.numbers import capital, first_of
 
 MOST_NAMED = 4
 """Most devices or logs in a sentence, and most parameters in the first picture."""
-BY_FILE = "`... --serial '([^/]+)$' -o NEW_FOLDER`: one unit a file"
+BY_FILE = "`--serial '([^/]+)$' -o NEW_FOLDER`: one unit a file"
 RATE_ASSUMED = "rate-assumed"
 OPEN = ("missing-physics", "unexplained")
 """Verdicts with effects or residuals that the calibration does not include."""

@@ -12,7 +12,6 @@ from trihedron.arrays import AXES
 from trihedron.errors import InputError
 from trihedron.records import (
     PARAMETER_NAMES,
-    AllanCurve,
     Calibration,
     Noise,
     Recording,
@@ -122,18 +121,6 @@ def noise_columns(noise: Noise) -> Columns:
             known = (math.nan if size is None else float(size) for size in sizes)
             rows.append((axis.name, term.value, found.is_present, found.value, *known, unit))
     return of_rows(("axis", "term", "is_present", "value", "sigma", "lower", "upper", "unit"), rows)
-
-
-def curve_columns(curve: AllanCurve) -> Columns:
-    """A row per averaging time and channel: deviation with its interval."""
-    k, channels = len(curve.clusters), curve.n_channels
-    return {
-        "channel": [name for name in curve.names for _ in range(k)],
-        "tau_s": np.tile(curve.tau_s, channels),
-        "cluster": np.tile(curve.clusters, channels),
-        **{name: getattr(curve, name).reshape(k, -1).T.ravel() for name in ("deviation", "lower", "upper", "edf")},
-        "unit": [unit for unit in curve.units for _ in range(k)],
-    }
 
 
 def sessions_columns(model: SessionsModel) -> Columns:

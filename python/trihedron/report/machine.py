@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 from trihedron.files.calibration import calibration_document, plain
-from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
+from trihedron.records import Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
 from trihedron.records.sessions import Session, SessionsModel
 from trihedron.report.channels import channels_record
@@ -24,13 +24,6 @@ def recording_record(recording: Recording) -> dict[str, Any]:
 def json_text(machine: dict[str, Any]) -> str:
     """Strict JSON; non-finite numbers are ``null``."""
     return escaped_json(json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
-
-
-def curve_record(curve: AllanCurve) -> dict[str, Any]:
-    """An Allan curve: channels in the order of ``names``, arrays unchanged."""
-    names = ("kind", "rate_hz", "n_samples", "confidence", "stride", "names", "units", "tau_s", "clusters")
-    arrays = ("deviation", "lower", "upper", "edf", "n_terms")
-    return {name: getattr(curve, name) for name in (*names, *arrays)}
 
 
 def segments_record(segments: Segments, recording: Recording | None = None) -> dict[str, Any]:

@@ -4,14 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-import numpy as np
-
-from trihedron.records import AllanCurve, Finding, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records import Finding, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.records.noise import of_axes
 from trihedron.report.document import Block, Code, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
-from trihedron.report.noise_charts import allan_chart, curve_chart, part_names, sensors_chart
+from trihedron.report.noise_charts import allan_chart, part_names, sensors_chart
 from trihedron.report.noise_units import IN_SLOW_NOISE, TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.report.segments import rate_in_words
@@ -19,16 +17,13 @@ from trihedron.units import micro_g_from_m_s2
 
 _NO_UNIT = """The unit of the log is not known: give --gyro-unit and --accel-unit, or the size of a count with \
 --gyro-lsb and --accel-lsb."""
-LINES = "(section Kalibr, in `... --full` and in --report)"
+LINES = "(section Kalibr, in --full and in --report)"
 NEXT = f"Take N and K into a filter {LINES}; average for no longer than the best averaging time."
 LONGER = "Record a static log of an hour or more for B and K; of this one take N alone."
-SAY_COUNTS = """State the size of a count, for terms in SI: `... --gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB`, such \
+SAY_COUNTS = """State the size of a count, for terms in SI: `--gyro-lsb SIZE --accel-lsb SIZE`, such \
 as "0.05 deg/s" and "3.33 mg" from the data sheet of this part at its range, or --calibration FILE."""
-SAY_UNITS = "State the unit of the deviations, for terms in SI: `... --gyro-unit UNIT --accel-unit UNIT`."
 BEYOND = "beyond the log"
 """An averaging time at which the fitted sum still falls."""
-MOST_ROWS = 12
-"""Rows of a curve's table, about; averaging times between them are omitted."""
 
 
 def noise_report(
@@ -86,9 +81,7 @@ def _next(noise: Noise) -> str:
     """Use of the terms; what is missing for terms in SI, or for those of slow noise."""
     longer = [LONGER] if noise.shows_white_alone else []
     if not all(customary(TermName.WHITE, axis.unit) for axis in noise.axes):
-        # A curve has no counts.
-        is_curve = any(f.code == "curve-alone" for f in noise.findings)
-        return " ".join([*longer, SAY_UNITS if is_curve else SAY_COUNTS])
+        return " ".join([*longer, SAY_COUNTS])
     if (actions := [f.action for f in noise.findings if f.code in IN_SLOW_NOISE]) or longer:
         return " ".join(longer or [f"Take N alone into a filter {LINES}.", *actions])
     has_walk = any(axis.terms[TermName.RATE_RANDOM_WALK].is_present for axis in noise.axes)
@@ -276,34 +269,3 @@ def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
 def noise_picture(noise: Noise) -> Picture:
     """All curves of a log in one figure, a row for each sensor."""
     return Picture("allan", "Allan deviation of every axis.", partial(allan_chart, noise.curve, _groups(noise)))
-
-
-def curve_summary(curve: AllanCurve) -> Document:
-    """Allan deviations with their intervals, at about a dozen averaging times."""
-    k = len(curve.clusters)
-    chosen = np.unique(np.linspace(0, k - 1, min(k, MOST_ROWS)).round().astype(int))
-    deviation, lower, upper = (values.reshape(k, -1) for values in (curve.deviation, curve.lower, curve.upper))
-    units = [f" [{unit_in_print(unit)}]" if unit else "" for unit in curve.units]
-    names = [f"{name}{unit}" for name, unit in zip(curve.names, units, strict=True)]
-    rows = tuple(
-        (
-            plain_number(float(curve.tau_s[i]), 3),
-            *(
-                f"{plain_number(float(deviation[i, c]), 4)} "
-                f"({plain_number(float(lower[i, c]), 3)} to {plain_number(float(upper[i, c]), 3)})"
-                for c in range(deviation.shape[1])
-            ),
-        )
-        for i in chosen
-    )
-    return Document(
-        title="Allan deviation",
-        subtitle=f"{curve.kind}, {curve.n_samples} readings at {plain_number(curve.rate_hz, 5)} Hz",
-        verdict=f"{how_many(curve.n_channels, 'channel')}, {how_many(k, 'averaging time')}; "
-        f"intervals of {100.0 * curve.confidence:g} %.",
-        is_trustworthy=True,
-        sections=(
-            Section("Deviation", (Table(("τ [s]", *names), rows, "Allan deviation"),)),
-            Section("Figures", (Picture("allan", "Allan deviation.", partial(curve_chart, curve)),)),
-        ),
-    )

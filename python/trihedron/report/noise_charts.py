@@ -125,20 +125,6 @@ def _panels(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> list[Pan
     ]
 
 
-def curve_chart(curve: AllanCurve) -> Chart:
-    """Every channel of a curve with its interval, on one pair of axes."""
-    k = len(curve.clusters)
-    deviation, lower, upper = (values.reshape(k, -1) for values in (curve.deviation, curve.lower, curve.upper))
-    marks: list[Mark] = []
-    for c, name in enumerate(curve.names):
-        marks.append(Band(curve.tau_s, lower[:, c], upper[:, c], f"{100 * curve.confidence:g} % interval"))
-        marks.append(Line(curve.tau_s, deviation[:, c], name, AXIS_COLOURS[c % 3]))
-    units = {unit_in_print(unit) for unit in curve.units if unit}
-    unit = units.pop() if len(units) == 1 else ""
-    y = Scale(_labelled(unit), unit, is_log=True)
-    return Chart((Panel(TIME, y, tuple(marks), height_px=270),))
-
-
 def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
     """Both sensors side by side, three axes each, with the best averaging time."""
     panels = []

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from trihedron.errors import InputError
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.files.output import write_whole
-from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
+from trihedron.records import Calibration, Noise, Recording, Segments, Verification
 from trihedron.records.filter_noise import FilterNoise
 from trihedron.records.plan import ExperimentPlan
 from trihedron.records.ranking import Ranking
@@ -33,7 +33,7 @@ from trihedron.report.drawing import figures
 from trihedron.report.extended import calibration_result_report
 from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
 from trihedron.report.kalman import kalman_record, kalman_report
-from trihedron.report.noise import curve_summary, noise_picture, noise_report
+from trihedron.report.noise import noise_picture, noise_report
 from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_fragment
 from trihedron.report.plan import plan_report
@@ -91,7 +91,6 @@ _KINDS: dict[type, _Shown] = {
     Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
     FilterNoise: _Shown(filter_noise_report, filter_noise_record, filter_noise_columns),
-    AllanCurve: _Shown(curve_summary, machine.curve_record, frames.curve_columns),
     Recording: _Shown(recording_summary, machine.recording_record, frames.recording_columns),
     Segments: _Shown(segments_report, machine.segments_record, frames.segments_columns),
     ExperimentPlan: _Shown(plan_report, asdict),

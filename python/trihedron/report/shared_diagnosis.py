@@ -99,10 +99,10 @@ def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> st
     pairs = zip(found.diagnoses, found.of_single_recordings, strict=True)
     if alone := [f"`trihedron diagnose {as_arguments(one.recording_source)}`" for one, ids in pairs if ids]:
         return (
-            f"What a recording misses alone belongs to its session: {listed(alone)}; or to another unit, as "
-            "`trihedron calibrate ...` shows where S differs."
+            f"What a recording misses alone belongs to its session: {listed(alone)}; or to another unit: `calibrate` "
+            "with all of them shows where S differs."
         )
-    return "Nothing is to be added. Calibrate the recordings together: `trihedron calibrate ... -o calibration.json`."
+    return "Nothing is to be added. Calibrate them together: `calibrate` in place of `diagnose`."
 
 
 def _effects(found: SharedDiagnosis, names: list[str]) -> tuple[Block, ...]:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from trihedron.records import Finding
-from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.findings import STATED, beyond_headline, likely
 from trihedron.report.numbers import BEFORE_UNIT
@@ -38,19 +37,18 @@ InLines = list[list[list[str]]]
 
 @dataclass(frozen=True)
 class Style:
-    """Width, colours and characters of the output."""
+    """Width and colours of the output."""
 
     width: int = WIDTH
     has_colour: bool = False
-    is_ascii: bool = False
 
     def paint(self, text: str, code: str) -> str:
         """The text in a colour, where colours are supported."""
         return f"\x1b[{code}m{text}\x1b[0m" if self.has_colour and text else text
 
     def plain(self, text: str) -> str:
-        """The text with control characters escaped, since names in logs are untrusted, and in ASCII if needed."""
-        return escaped(ascii_of(text) if self.is_ascii else text)
+        """The text with control characters escaped, since names in logs are untrusted."""
+        return escaped(text)
 
 
 def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:

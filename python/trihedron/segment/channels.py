@@ -1,6 +1,5 @@
 """The log as short blocks of all channels, on which the whole segmentation works."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,18 +78,6 @@ class BlockSums:
         for probe, triad in zip(self.probes, triads, strict=True):
             probe.append(triad[first :: self.stride].copy())
         self.n += len(triads[0])
-
-    def state(self) -> dict[str, FloatArray]:
-        """The state from which :meth:`restore` continues after the rows so far."""
-        mean, variance, is_valid = (np.concatenate([part[k] for part in self.parts]) for k in range(3))
-        probes = {f"probe{k}": np.concatenate(probe) for k, probe in enumerate(self.probes)}
-        return {"mean": mean, "variance": variance, "is_valid": is_valid.astype(np.float64), **probes}
-
-    def restore(self, n: int, state: Mapping[str, FloatArray]) -> None:
-        """Continue after ``n`` rows of the same log, a multiple of ``length``."""
-        self.n = n
-        self.parts = [(state["mean"], state["variance"], state["is_valid"] > 0.0)]
-        self.probes = [[state[f"probe{k}"]] for k in range(len(self.probes))]
 
     def channels(self) -> Channels:
         """All blocks so far."""

@@ -2,7 +2,7 @@
 
 A session's poses are seconds long and differ slightly (temperature, gravity on the axis, a hand): every figure is a
 mean of logarithms over poses, whose error comes from the number of readings and from the scatter between poses. Two
-logs are then compared figure by figure (:func:`ratio_of`). docs/noise.md, section 8.
+logs are then compared figure by figure (:func:`ratio_of`). docs/noise.md, section 7.
 """
 
 import math

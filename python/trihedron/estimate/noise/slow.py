@@ -14,7 +14,7 @@ directions of gravity the norm residuals have
     V = σ² + s² I + (u uᵀ) ∘ (B² V_B + K² V_K)
 
 The likelihood is restricted to contrasts that the calibration does not absorb, and tabulated over B, K, common to the
-axes, and s. docs/noise.md, section 9.
+axes, and s. docs/noise.md, section 8.
 """
 
 from __future__ import annotations

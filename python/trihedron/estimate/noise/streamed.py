@@ -1,6 +1,6 @@
 """Noise of logs that do not fit into memory: one pass over their chunks, in bounded memory."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,9 +24,6 @@ from trihedron.estimate.noise.screening import readout
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM
 from trihedron.records import AllanCurve, Noise, NoiseAxis
 
-Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
-_PARTS = ("numbers", "fine", "window", "sums")
-"""Names of the arrays of a channel's state."""
 HEAD = 1 << 20
 """Readings kept from the start of the log: they determine the noise that is faster than the means."""
 
@@ -41,49 +38,26 @@ def stream_noise(
     clusters: Sequence[int] | None = None,
     budget_bytes: int = STREAM_BUDGET_BYTES,
     source: str = "stream",
-    state: Mapping[str, FloatArray] | None = None,
-    keep: Keep | None = None,
 ) -> Noise:
     """Noise terms and Allan curve of a log that is read in chunks (k, channels), in one pass (docs/noise.md, 4).
 
     Slow terms come from means over the whole log, fast ones from its first million readings. Steps are detected, a
-    warm-up and a wave subtracted, in the means; impacts are not excluded.
-
-    ``keep`` is called after every chunk with the number of readings so far and a function that returns the state of the
-    pass; with such a ``state`` the pass continues, and ``chunks`` begin where it was taken. Raises ``InputError``
-    when a chunk has missing readings or another number of channels, or the log is too short.
+    warm-up and a wave subtracted, in the means; impacts are not excluded. Raises ``InputError`` when a chunk has
+    missing readings or another number of channels, or the log is too short.
     """
     check_question(rate_hz, "overlapping", 0.95)
     sizes = default_clusters(n_samples or 1 << 44) if clusters is None else checked_clusters(clusters)
     stream: _core.AllanStream | None = None
     head: list[FloatArray] = []
-    kept = seen = 0
-
-    def now() -> dict[str, FloatArray]:
-        assert stream is not None
-        held = {
-            f"{part}{c}": a for c, parts in enumerate(stream.state()) for part, a in zip(_PARTS, parts, strict=True)
-        }
-        return {"head": np.concatenate(head), "readings": np.array(float(seen)), **held}
-
-    if state:
-        head, channels = [state["head"]], state["head"].shape[1]
-        kept = len(head[0])
-        stream = _stream_of(channels, sizes, budget_bytes)
-        numbers, fine, window, sums = ([state[f"{part}{c}"] for c in range(channels)] for part in _PARTS)
-        stream.restore(list(zip(numbers, fine, window, sums, strict=True)))
-        seen = int(state["readings"])
+    kept = 0
     for chunk in chunks:
         readings = as_readings(chunk)
         if stream is None:
             stream = _stream_of(readings.shape[1], sizes, budget_bytes)
         stream.extend(readings)
-        seen += len(readings)
         if kept < HEAD:
             head.append(np.array(readings[: HEAD - kept], dtype=np.float64))
             kept += len(head[-1])
-        if keep is not None:
-            keep(seen, now)
     if stream is None:
         raise InputError("the log holds no chunk of readings")
     found, variance, terms, stride, n, means = stream.finish()

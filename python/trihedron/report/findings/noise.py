@@ -102,11 +102,6 @@ _SPECTRUM = {
             ("rises", "aliasing, resampling, a resonance or vibration."),
         )
     },
-    ("spectrum-low-pass", "curve", WARNING): Words(
-        "Below {first_s:.3g} s the curve is not a sum of noise terms.",
-        "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance.",
-        "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
-    ),
     ("spectrum-unexplained", "", WARNING): Words(
         "Near {frequency_hz:.2g} Hz (means of {tau_s:.2g} s) the power lies {deviation:abs .0f %} "
         "{deviation:<below|above} the fitted terms.",
@@ -116,12 +111,6 @@ _SPECTRUM = {
 }
 
 _TERMS = {
-    ("curve-alone", "", NOTE): Words(
-        "The terms come from Allan deviations alone, taken as overlapping ones of an undisturbed log.",
-        "",
-        "Jumps, impacts, spectral lines and gaps cannot be separated from noise in a curve; use the log if there "
-        "is one.",
-    ),
     ("slow-noise-unresolved", "", NOTE): Words(
         "Slow noise is there; B and K are not separable here: B at least "
         "{flicker_lower:.2g}, at most {flicker_upper:.2g} {unit:unit}, K at least {walk_lower:.2g}, at most "
