@@ -258,7 +258,7 @@ def test_the_table_names_every_term_and_the_files_hold_the_same(files):
     rows = list(csv.reader(io.StringIO(files["csv"].read_text())))
     assert len(rows) == 1 + len(document["curve"]["tau_s"])
     assert files["png"].read_bytes().startswith(b"\x89PNG")
-    assert files["html"].read_text().count("<figure id=") == 3  # both sensors, then each
+    assert files["html"].read_text().count("<figure id=") == 1
 
 
 def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):

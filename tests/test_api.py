@@ -102,7 +102,7 @@ def test_a_figure_is_drawn_where_it_is_asked_for():
     assert result.plot("residuals", ax=above) is figure
     assert above.has_data()
     assert not below.has_data()
-    with pytest.raises(ValueError, match="needs 2 axes, one a panel; ax has 3"):
+    with pytest.raises(ValueError, match="needs 1 axes, one a panel; ax has 3"):
         result.plot("residuals", ax=[above, below, above])
 
 

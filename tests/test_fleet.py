@@ -194,22 +194,3 @@ def test_a_worker_that_is_killed_loses_nothing(logs, tmp_path):
     result = trihedron.fleet(two, tmp_path, workers=1, diagnose=False, gravity_m_s2=G, progress=kill_one)
     assert len(killed) == 1
     assert [row["status"] for row in result.rows] == ["done"] * 2
-
-
-def test_a_log_in_the_folder_of_another_device_is_given_back_to_the_one_that_it_agrees_with(tmp_path):
-    rng = np.random.default_rng(5)
-    sigma = 1e-4
-    one, other, third = rng.normal(size=(3, 21)) * 1e-2
-    other[12], third[12] = one[12] - 0.05, one[12] + 0.05
-    of = {"first": (one, one, other), "second": (other, other), "third": (third, third)}
-    rows = [
-        row(serial, f"{serial}{k}.csv", numbers + rng.normal(size=21) * sigma, sigma)
-        for serial, logs in of.items()
-        for k, numbers in enumerate(logs)
-    ]
-    rows[5]["warnings"] = ["clipping"]
-    summary = summarise(rows, tmp_path).summary
-    assert [(found.odd, found.fits) for found in summary.mixed] == [("first2.csv", "second")]
-    document = fleet_report(summary)
-    assert "7 of 7 logs usable (1 with warnings: clipping in third0.csv)" in document.verdict
-    assert document.what_next.startswith("Move first2.csv from first to second")

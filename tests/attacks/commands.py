@@ -37,7 +37,7 @@ BY_OPTION = {
     "--gyro-lsb": ["0.03 deg/s", "x", "nan deg/s"],
     "--accuracy": ["10", "accel 0.05 %, gyro 0.1 %", "x"],
 }
-OUTPUTS = {"output", "json", "report", "csv", "plot", "truth", "updated", "improved"}
+OUTPUTS = {"output", "json", "report", "csv", "plot", "truth", "improved"}
 ENDINGS = [".csv", ".json", ".html", ".txt", ".png", ".npz", ".parquet", ".toml", ""]
 LOGS = ["log.csv", "short.csv", "static.csv", "a.npy", "b.npz", "a.zip", "a.gz", "quoted.csv"]
 # Files in the place of an input, and what else stands there in half of the cases.

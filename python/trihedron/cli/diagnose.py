@@ -20,7 +20,6 @@ OPTIONS = {
     "against": ("SIM", "Your simulation as model: a log or a scenario (.toml, or the name of a ready-made one)."),
     "reference": ("MOTION", "Known motion beside the log: attitude, rate, pose or a log."),
     "improved": ("FILE.toml", "Write the scenario with the parameters of the log."),
-    "updated": ("FILE", "Write the calibration that this log itself gives."),
     "alpha": ("P", "Chance that a healthy log is called anything but consistent."),
     "full": "Print the whole report, with every candidate.",
 }
@@ -36,7 +35,6 @@ def diagnose(
     reference: Path | None = None,
     reference_columns: str | None = None,
     improved: Path | None = None,
-    updated: Path | None = None,
     alpha: float = FALSE_ALARM,
     results: FullResults,
 ) -> None:
@@ -47,8 +45,6 @@ def diagnose(
     if calibration is not None and against is not None:
         raise typer.BadParameter("give either --calibration or --against: each is the model")
     check_alpha(alpha)
-    if updated is not None and calibration is None:
-        raise typer.BadParameter("--updated goes with --calibration OLD; without one, use trihedron calibrate")
     if improved is not None and (against is None or against.suffix.lower() != ".toml"):
         raise typer.BadParameter(
             "--improved goes with --against SCENARIO.toml, the file that is improved; trihedron simulate --template "
@@ -56,13 +52,13 @@ def diagnose(
         )
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
-    results.check(updated, improved, inputs=(*sources.files, calibration, against))
+    results.check(improved, inputs=(*sources.files, calibration, against))
     if sources.are_many():
-        if any(one is not None for one in (calibration, against, reference, improved, updated)):
+        if any(one is not None for one in (calibration, against, reference, improved)):
             raise typer.BadParameter("several logs are diagnosed without a model: each by itself, and what all share")
         _diagnose_many(sources, place, alpha, results)
         return
-    from trihedron.files.calibration import read_calibration, write_calibration
+    from trihedron.files.calibration import read_calibration
 
     known = None if calibration is None else read_calibration(calibration)
     recording = sources.one().read()
@@ -86,14 +82,6 @@ def diagnose(
     results.write(document, lambda: diagnosis_document(result))
     if improved is not None and against is not None:
         _improve(against, result, improved, force=results.force)
-    if updated is not None:
-        if result.updated is None:
-            say(f"{updated}: not written, the poses of this log do not carry a calibration of their own.")
-        else:
-            write_calibration(result.updated, updated, overwrite=results.force)
-            say(f"calibration of this log: {updated}")
-    elif known is not None and result.updated is not None and any(p.significant for p in result.parameters):
-        say("The calibration that this log itself gives: --updated FILE.")
     if not results.full and results.report is None:
         _point_to_more(result)
     if known is not None:

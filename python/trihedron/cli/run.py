@@ -26,7 +26,7 @@ UNKNOWN_RATE = " --rate HZ"
 """The same where the log states no rate."""
 # Options that choose where results go and do not affect them.
 _NOT_OPTIONS = {
-    *("json", "report", "output", "force", "full", "csv", "plot", "updated", "improved"),
+    *("json", "report", "output", "force", "full", "csv", "plot", "improved"),
     *("log", "accel", "gyro", "calibration", "result"),
 }
 

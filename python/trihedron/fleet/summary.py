@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -225,19 +225,7 @@ def _not_one_unit(by_device: dict[str, list[Session]], changes: Sequence[Change]
             parameter = next(one for one in PARAMETERS if (one.id, one.name) == (change.id, change.names[k]))
             odd = apart.pop() if len(apart) == 1 and len(sessions) > 2 else ""
             mixed.append(MixedLogs(serial, len(sessions), parameter, abs(change.size[k]), odd))
-    sound = {name: logs for name, logs in by_device.items() if name not in {one.serial for one in mixed}}
-    return tuple(replace(one, fits=_fits(one, by_device[one.serial], sound)) for one in mixed)
-
-
-def _fits(one: MixedLogs, sessions: Sequence[Session], devices: dict[str, list[Session]]) -> str:
-    """The only other device that the odd log can be of; empty where there is none, or several."""
-    odd = [session for session in sessions if session.name == one.odd]
-    fitting = [
-        name
-        for name, logs in devices.items()
-        if odd and not of_another_unit([*odd, *logs], changes_among([[*odd, *logs]], alpha=FALSE_ALARM))
-    ]
-    return fitting[0] if len(fitting) == 1 else ""
+    return tuple(mixed)
 
 
 def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[EffectCount, ...]:

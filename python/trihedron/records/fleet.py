@@ -44,15 +44,13 @@ class Outlier:
 @dataclass(frozen=True)
 class MixedLogs:
     """Logs under one serial number that are of different devices: ``parameter`` differs by ``difference``; ``odd`` is
-    the one log that differs from all others, ``fits`` the only device whose logs it agrees with; each empty where there
-    is none."""
+    the one log that differs from all others, empty where there is none."""
 
     serial: str
     n_logs: int
     parameter: Parameter
     difference: float
     odd: str = ""
-    fits: str = ""
 
 
 @dataclass(frozen=True)

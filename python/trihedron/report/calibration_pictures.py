@@ -1,24 +1,21 @@
-"""The pictures of a calibration: before and after, residuals by pose, directions of the poses."""
+"""The pictures of a calibration: residuals by pose, directions of the poses."""
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, rms_of
+from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, FitQuality, Recording, Segments
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
-from trihedron.report.calibration_charts import mm_s2, move_chart, poses_chart, residual_chart
-from trihedron.report.chart import Chart, Level, Mark, Panel, Points, Scale
+from trihedron.report.calibration_charts import move_chart, poses_chart, residual_chart
 from trihedron.report.document import Block, Picture
-from trihedron.report.drawn import said
-from trihedron.report.numbers import how_many, plain_number
+from trihedron.report.numbers import how_many
 from trihedron.report.segments import pose_lines, signals_picture
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 
 def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture | None:
-    """Residual of every pose; with segments also the gravity error before and after calibration."""
+    """Residual of every pose."""
     quality = calibration.accelerometer.quality
     if quality is None:
         return None
@@ -31,45 +28,7 @@ def lead_picture(calibration: Calibration, segments: Segments | None) -> Picture
         caption += "small for wrong S and b too, and prove nothing."
     lines = pose_lines(segments)
     caption += " Dashed upright: disturbed or moved, counts less." if lines else ""
-    means = None if segments is None else segments.accelerometer_mean
-    chart = partial(residual_chart, quality)
-    if means is not None and len(means) == len(quality.residual):
-        chart = partial(_lead_chart, calibration, means, lines)
-        caption += f" Second panel: its size before calibration ({before_words(calibration)}) and after."
-    return Picture("residuals", caption, chart)
-
-
-def _lead_chart(calibration: Calibration, means: FloatArray, lines: tuple[Level, ...]) -> Chart:
-    """Residual of every pose, and |gravity error| before and after calibration; ``means`` (n, 3) raw readings."""
-    quality = calibration.accelerometer.quality
-    assert quality is not None
-    before = mm_s2(uncalibrated_error(calibration, means))
-    after = mm_s2(_unseen(quality))
-    pose = np.arange(1, len(before) + 1, dtype=np.float64)
-    noise = rms_of(mm_s2(quality.sigma))
-    marks: list[Mark] = [*lines]
-    marks += [Level(y=noise, name="noise alone (rms)", is_dashed=True)] if noise > 0.0 else []
-    worst = [f.numbers["worst_prediction_g"] for f in calibration.findings if "worst_prediction_g" in f.numbers]
-    far = mm_s2(calibration.gravity_m_s2 * np.array(worst[:1]))
-    marks += [Level(y=float(y), name="1 σ in the least certain orientation", colour="accent") for y in far]
-    # Colours as in the residuals: one for in-sample, one for cross-validated.
-    held = _is_held(quality)
-    kinds = (
-        (before, "before calibration", "soft"),
-        (after, HELD_OUT if held else IN_SAMPLE, "accent" if held else "c1"),
-    )
-    for values, name, colour in kinds:
-        tips = [said(f"pose {k}", v, "mm/s²") for k, v in enumerate(values, 1)]
-        size = np.where(values == 0.0, np.nan, np.abs(values))
-        marks.append(Points(pose, size, tips, None, name, colour, colour == "accent"))  # type: ignore[arg-type]
-    rms = [plain_number(float(np.sqrt(np.nanmean(values**2)))) for values in (before, after)]
-    # In sample, a few poses are fitted exactly: no title of their own.
-    title = f"{rms[0]} → {rms[1]} mm/s² rms" if held else f"{rms[0]} mm/s² rms before calibration"
-    x = Scale("pose", limits=(0.3, len(pose) + 0.7), whole=True)
-    y = Scale("size of the gravity error [mm/s²]", "mm/s²", is_log=True)
-    sizes = Panel(x, y, tuple(marks), title=title)
-    errors = [replace(panel, title="error of every pose") for panel in residual_chart(quality, lines=lines).panels]
-    return Chart((*errors, sizes), columns=2)
+    return Picture("residuals", caption, partial(residual_chart, quality, lines))
 
 
 def uncalibrated_error(calibration: Calibration, means: FloatArray) -> FloatArray:

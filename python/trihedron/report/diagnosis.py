@@ -20,7 +20,7 @@ from trihedron.report.diagnosis_numbers import (
     numbers_blocks,
     stages_blocks,
 )
-from trihedron.report.diagnosis_overview_charts import forest_picture, ratios_picture, strengths_picture, traces_picture
+from trihedron.report.diagnosis_overview_charts import forest_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
     NOT_JUDGED,
     findings_of,
@@ -51,8 +51,6 @@ _CAPTIONS = {
     "moves": "Tilt error after every rotation: gravity predicted with the gyro against gravity measured.",
     "dynamics": "Velocity error over a rotation: integral of acceleration between two poses; should be 0.",
 }
-EVEN = 1e-6
-"""Scatter of timestamps, in sample intervals, that is the rounding of their numbers."""
 LEAST_SHARE = 0.005
 """Smallest share of the misfit that is printed."""
 MOST_PARAMETERS = 9
@@ -82,7 +80,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         sections.append(Section("Stage by stage", stages_blocks(diagnosis, MEANING)))
         sections += [Section("Parameters that agree", (table,)) for table in numbers_blocks(diagnosis)]
     if diagnosis.noise_compared:
-        noise = (*ratios_picture(diagnosis), *noise_blocks(diagnosis), *noise_pictures(diagnosis))
+        noise = (*noise_blocks(diagnosis), *noise_pictures(diagnosis))
         sections.append(Section("Noise and sampling of the model", noise))
     findings: Iterable[Finding] = findings_of(diagnosis)
     if diagnosis.verdict in ("not-testable", "unexplained"):
@@ -127,17 +125,6 @@ def by_reference_alone(diagnosis: Diagnosis) -> bool:
     return all(one.domain == "rate" for one in diagnosis.domains) and getattr(diagnosis, "reference", None) is not None
 
 
-def _time_errors(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Both figures of the time error side by side, where the timestamps scatter about an even clock."""
-    recording = getattr(diagnosis, "recording", None)
-    timing = next((one for one in diagnosis.domains if one.domain == "timing"), None)
-    if recording is None or timing is None or recording.sampling.timestamp_error_s * recording.rate_hz < EVEN:
-        return ()
-    scatter = size_in_words(recording.sampling.timestamp_error_s, timing.unit)
-    head = ("", "timestamps about an even clock", "samples about that clock, seen in motion")
-    return (Table(head, (("rms", scatter, rms_in_words(timing)),), "Time errors, by timestamps and by motion"),)
-
-
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not diagnosis.domains:
         return (Paragraph("No domain was tested."),)
@@ -162,7 +149,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     beside = ", in sample" if is_fitted else ", S and b fitted to this log (model: last row)" if is_refitted else ""
     caption = f"Residuals by domain{beside}; χ²/dof is 1 by noise alone"
     caption += f", and a residual disagrees below p {plain_number(diagnosis.alpha / len(DOMAINS), 2)}"
-    blocks: list[Block] = [Table(head, tuple(rows), caption), *_time_errors(diagnosis)]
+    blocks: list[Block] = [Table(head, tuple(rows), caption)]
     # Parameters that differ have a section of their own.
     places = tuple(
         (MEANING[d.domain], place)

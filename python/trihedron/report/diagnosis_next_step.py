@@ -182,7 +182,7 @@ def _taken_by(model: str) -> str:
     if model.endswith(".toml"):
         return "`--improved improved.toml` writes your scenario with them"
     if model.endswith(".json"):
-        return "`--updated updated.json` writes the calibration of this log"
+        return "`trihedron calibrate LOG -o updated.json`"
     # A simulated log has an ending; a ready-made scenario is a name.
     where = "your simulation, or in " if PurePath(model).suffix or not model else ""
     return (

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
+from trihedron.records.diagnosis import Diagnosis, ParameterDifference
 from trihedron.report.chart import (
     ROW_PX,
     TWO_SIGMA,
@@ -25,9 +25,9 @@ from trihedron.report.chart import (
 )
 from trihedron.report.diagnosis_numbers import in_print
 from trihedron.report.diagnosis_words import LACKS, NOT_JUDGED, is_explained, judged_in_words
-from trihedron.report.document import Block, Picture
+from trihedron.report.document import Picture
 from trihedron.report.drawn import envelope
-from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of, term_in_print
+from trihedron.report.names import MEANING, axis_in_print, id_in_print, label_of
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
 from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units
@@ -44,8 +44,6 @@ WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""
 SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
 CORRECTED = "corrected"
-RATIOS = ("N", "B", "K", "Q", "bandwidth", "resolution", "range", "rate", "correlation-time", "poses", "moves")
-"""Terms whose ratio is drawn; octaves are drawn as spectra."""
 Models = tuple[Calibration | None, Calibration | None]
 """The recording's own parameters and those of the simulation."""
 Side = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
@@ -108,16 +106,6 @@ def forest_picture(diagnosis: Diagnosis) -> Picture:
     return Picture("forest", caption, partial(_forest_chart, diagnosis.parameters))
 
 
-def ratios_picture(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """Ratios of noise and sampling, model over recording."""
-    rows = [n for n in diagnosis.noise_compared if n.ratio and n.ratio > 0.0 and n.term in RATIOS]
-    if not rows:
-        return ()
-    caption = "Noise and sampling of the model over the recording's, with the interval where there is one; orange: "
-    caption += "differs; 1: the same."
-    return (Picture("ratios", caption, partial(_ratios_chart, rows)),)
-
-
 def _forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
     """A panel for every group of parameters."""
     groups: dict[str, list[ParameterDifference]] = {}
@@ -144,39 +132,6 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     names = tuple(axis_in_print(p.name) for p in members)
     marks = (Level(x=0.0, name="model"), dots)
     return Panel(x, Scale("", names=names), marks, title=title, height_px=ROW_PX * (len(members) + 1))
-
-
-def _ratios_chart(rows: Sequence[NoiseDifference]) -> Chart:
-    """A row per term and axis, on one logarithmic scale."""
-    names = tuple(map(_row_name, rows))
-    place = -np.arange(1.0, len(rows) + 1.0)
-    ratio = np.array([n.ratio for n in rows], dtype=np.float64)
-    ends = np.array([n.interval or (math.nan, math.nan) for n in rows])
-    x = np.column_stack([ends, np.full(len(rows), math.nan)]).ravel()
-    marks: list[Mark] = [Level(x=1.0, name="the same"), Line(x, np.repeat(place, 3), "", "soft")]
-    for is_other, name, colour in ((False, "agrees", "c1"), (True, "differs", "accent")):
-        picked = np.array([bool(n.significant) == is_other for n in rows])
-        if np.any(picked):
-            tips = [_ratio_words(n, name) for n, is_picked in zip(rows, picked, strict=True) if is_picked]
-            marks.append(Points(ratio[picked], place[picked], tips, None, name, colour))  # type: ignore[arg-type]
-    seen = np.concatenate([ratio, ends[np.isfinite(ends) & (ends > 0.0)], [0.5, 2.0]])
-    limits = (float(seen.min()) / 1.15, float(seen.max()) * 1.15)
-    along = Scale("model / recording", is_log=True, limits=limits)
-    return Chart((Panel(along, Scale("", names=names), tuple(marks), height_px=20 * len(rows) + ROW_PX),))
-
-
-def _row_name(n: NoiseDifference) -> str:
-    sensor = {"gyroscope": "gyro", "accelerometer": "accel", "both": "sampling"}[n.sensor]
-    return " ".join(part for part in (sensor, axis_in_print(n.axis), term_in_print(n.term)) if part)
-
-
-def _ratio_words(n: NoiseDifference, name: str) -> str:
-    assert n.ratio is not None
-    beside = ""
-    if n.model is not None and n.recording is not None:
-        model, own = plain_number(n.model), plain_number(n.recording)
-        beside = f" (model {model}, recording {own} {unit_in_print(n.unit)})"
-    return f"{_row_name(n)}: {plain_number(n.ratio)}{beside}, {name}"
 
 
 def traces_picture(

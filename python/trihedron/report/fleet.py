@@ -74,8 +74,7 @@ def fleet_report(summary: FleetSummary) -> Document:
     for one in summary.mixed:
         what, away = _by(one.parameter, one.difference)
         verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices"
-        fits = f" and agrees with those of {one.fits}" if one.fits else ""
-        verdict += f": {one.odd} differs from the others{fits}." if one.odd else "."
+        verdict += f": {one.odd} differs from the others." if one.odd else "."
         verdict += f" {capital(what)} differs by {away}."
     opened = Counter(log.verdict for log in summary.logs if log.verdict in OPEN)
     if opened:

@@ -22,14 +22,12 @@ def next_step_of_fleet(summary: FleetSummary, outliers: list[str], moved: list[s
     unusable = [log for log in unusable if RATE_ASSUMED not in log.serious]
     again = [f"{called(log, summary)}{_why(log)}" for log in unusable if not log.reread]
     opened = [called(log, summary) for log in usable if log.verdict in OPEN]
-    mixed = [one.serial for one in summary.mixed if not one.fits]
-    strays = [f"{one.odd} from {one.serial} to {one.fits}" for one in summary.mixed if one.fits]
+    mixed = [one.serial for one in summary.mixed]
     # One device a file separates all folders, also those of one device.
     counts = Counter(log.serial for log in summary.logs)
     several = {*moved, *(one.serial for one in summary.mixed)}
     by_file = f" ({BY_FILE})" if all(n == 1 or name in several for name, n in counts.items()) else ""
     steps = [f"give each device of {first_of(mixed)} a folder of its own{by_file}"] if mixed else []
-    steps += [f"move {first_of(strays)}, if that is where it belongs, and run again"] if strays else []
     steps += [f"if {first_of(moved)} contains several units, give each a folder{by_file}"] if moved else []
     for action in dict.fromkeys(log.reread for log in unusable if log.reread):
         names = first_of([called(log, summary) for log in unusable if log.reread == action])

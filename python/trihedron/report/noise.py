@@ -9,7 +9,7 @@ from trihedron.records.noise import of_axes
 from trihedron.report.document import Block, Code, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
-from trihedron.report.noise_charts import allan_chart, part_names, sensors_chart
+from trihedron.report.noise_charts import allan_chart, part_names
 from trihedron.report.noise_units import IN_SLOW_NOISE, TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.report.segments import rate_in_words
@@ -46,13 +46,12 @@ def noise_report(
         verdict=verdict_of(findings, _good(noise), _usable(noise), "NOT TO BE TRUSTED"),
         is_trustworthy=noise.is_trustworthy,
         stated_level="usable" if noise.shows_white_alone else None,
-        lead=_lead(noise, groups) if groups else None,
+        lead=noise_picture(noise) if groups else None,
         next_step=_next(noise) if noise.is_trustworthy else "",
         sections=(
             Section("Result", (Facts(tuple(facts)), *tables)),
             Section("Findings", (findings_block(findings),)),
             Section("Data sheet", tuple(dict.fromkeys(b for unit, axes in groups for b in _customary(axes, unit)))),
-            *((Section("Figures", tuple(_picture(noise, *group) for group in groups)),) if groups else ()),
             Section("Intervals", tuple(_intervals_table(axes, unit) for unit, axes in groups)),
             *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
             Section("Kalibr", _kalibr(noise)),
@@ -247,25 +246,14 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
     return rows
 
 
-def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
+def noise_picture(noise: Noise) -> Picture:
+    """All curves of a log in one figure, a row for each sensor."""
     caption = "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum "
     caption += "(dashed); N is its line at 1 s"
-    names = part_names(noise.curve, axes)
+    names = part_names(noise.curve, noise.axes)
     caption += ", K at 3 s" if any(name.startswith("K ") for name in names) else ""
     caption += ", B 1.5 times its flat line" if any(name.startswith("B ") for name in names) else ""
     caption += "; a term with < is in the sum and does not show by itself" if any("<" in name for name in names) else ""
-    found = any(axis.optimal_averaging() is not None for axis in axes)
-    caption += "; the orange mark is the least deviation." if found else "."
-    return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(allan_chart, noise.curve, [(unit, axes)]))
-
-
-def _lead(noise: Noise, groups: list[tuple[str, list[NoiseAxis]]]) -> Picture:
-    caption = "Allan deviation of both sensors with its 95 % interval; orange: the minimum of the fitted sum, a longer "
-    caption += "mean is no better (no mark: it still falls at the end). The terms, each with its part of the "
-    caption += "curve, stand below."
-    return Picture("sensors", caption, partial(sensors_chart, noise.curve, groups))
-
-
-def noise_picture(noise: Noise) -> Picture:
-    """All curves of a log in one figure, a row for each sensor."""
-    return Picture("allan", "Allan deviation of every axis.", partial(allan_chart, noise.curve, _groups(noise)))
+    found = any(axis.optimal_averaging() is not None for axis in noise.axes)
+    caption += "; the orange mark is the least deviation, beyond which a mean is no better." if found else "."
+    return Picture("allan", caption, partial(allan_chart, noise.curve, _groups(noise)))

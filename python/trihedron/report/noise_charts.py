@@ -22,7 +22,6 @@ NAME_DECADES = (1.2, 0.3)
 MARGIN = 10.0 ** (0.5 * NAME_DECADES[0])
 """Distance of a name from the ends of the panel, as a factor in time: half a name."""
 
-BEST = "best averaging time"
 TIME = Scale("averaging time τ [s]", "s", is_log=True)
 
 
@@ -123,32 +122,6 @@ def _panels(curve: AllanCurve, unit: str, axes: Sequence[NoiseAxis]) -> list[Pan
         Panel(x, y, _marks(curve, c, axis, k, last_s), title=axis_in_print(axis.name), height_px=270)
         for k, (axis, c) in enumerate(zip(axes, chosen, strict=True))
     ]
-
-
-def sensors_chart(curve: AllanCurve, groups: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Chart:
-    """Both sensors side by side, three axes each, with the best averaging time."""
-    panels = []
-    for unit, axes in groups:
-        printed = unit_in_print(unit)
-        marks: list[Mark] = []
-        for k, axis in enumerate(axes):
-            c = curve.names.index(axis.name)
-            good = np.isfinite(curve.deviation[:, c])
-            tau, colour = curve.tau_s[good], AXIS_COLOURS[k % 3]
-            marks.append(Band(tau, curve.lower[good, c], curve.upper[good, c], "95 % interval"))
-            marks.append(Line(tau, curve.deviation[good, c], axis.name.split()[-1].upper(), colour))
-            best = axis.optimal_averaging()
-            if best is not None:
-                tip = f"{axis_in_print(axis.name)}: best averaging time {plain_number(best[0])} s, "
-                tip += f"{plain_number(best[1])} {printed}"
-                # Placed on the measured curve: the minimum of the fitted sum may be off it.
-                found = np.exp(np.interp(np.log(best[0]), np.log(tau), np.log(curve.deviation[good, c])))
-                marks.append(Points(np.array([best[0]]), np.array([found]), [tip], None, BEST, "accent"))
-        y = Scale(_labelled(printed), printed, is_log=True)
-        # Curves before points, so that the axes are together in the legend.
-        marks.sort(key=lambda mark: isinstance(mark, Points))
-        panels.append(Panel(TIME, y, tuple(marks), title=axes[0].name.rsplit(" ", 1)[0], height_px=250))
-    return Chart(tuple(panels), columns=len(panels))
 
 
 def _times(curve: AllanCurve) -> FloatArray:

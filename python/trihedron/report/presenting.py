@@ -33,7 +33,7 @@ from trihedron.report.drawing import figures
 from trihedron.report.extended import calibration_result_report
 from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
 from trihedron.report.kalman import kalman_record, kalman_report
-from trihedron.report.noise import noise_picture, noise_report
+from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_fragment
 from trihedron.report.plan import plan_report
@@ -138,10 +138,9 @@ def as_html(result: object) -> str:
 
 def pictures(result: object) -> dict[str, document.Picture]:
     """The figures of a result's report by name."""
-    found = {"allan": noise_picture(result)} if isinstance(result, Noise) else {}
     laid_out = _kind(result).document(result)
     every = [laid_out.lead, *(block for section in laid_out.sections for block in section.blocks)]
-    return found | {b.name: b for b in every if isinstance(b, document.Picture)}
+    return {b.name: b for b in every if isinstance(b, document.Picture)}
 
 
 def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:

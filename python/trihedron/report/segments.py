@@ -9,9 +9,9 @@ from trihedron.arrays import AXES, XYZ, FloatArray
 from trihedron.records import Finding, Pose, Recording, Segments, Severity, Truth
 from trihedron.records.noise import least_length_s
 from trihedron.report.channels import logged_sensors
-from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Points, Scale, Span
+from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Scale, Span
 from trihedron.report.document import Document, Facts, Picture, Section, Table
-from trihedron.report.drawn import envelope, said
+from trihedron.report.drawn import envelope
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, each_with_sigma, how_many, plain_number, unit_in_print
 from trihedron.units import RateUnit
@@ -38,9 +38,7 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
             Section("Findings", (findings_block(findings),)),
             Section("Poses", (pose_table(segments, recording),)),
         ),
-        lead=Picture("poses", "Mean readings.", partial(means_chart, segments))
-        if recording is None
-        else signals_picture(recording, segments),
+        lead=None if recording is None else signals_picture(recording, segments),
         next_step="For noise: `trihedron allan LOG`; for drift and temperature: `trihedron diagnose LOG`."
         if is_long
         else "Is every pose found? Then see what the log is fit for: `trihedron check LOG`.",
@@ -162,24 +160,6 @@ def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
         printed = unit_in_print(unit)
         y = Scale(f"{name}  [{printed}]", printed)
         panels.append(Panel(Scale("time [s]", "s", limits=limits), y, (*spans, *lines), height_px=190))
-    return Chart(tuple(panels), is_linked=True)
-
-
-def means_chart(segments: Segments) -> Chart:
-    """Mean readings of every pose over time, in the unit of the log."""
-    panels = []
-    for name, means in (("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)):
-        if means is None:
-            continue
-        marks = tuple(
-            Points(
-                segments.time_mid_s, means[:, k],
-                [said(f"pose {n}, {axis}", v, "") for n, v in enumerate(means[:, k], 1)],
-                None, axis, AXIS_COLOURS[k],
-            )
-            for k, axis in enumerate(XYZ)
-        )  # fmt: skip
-        panels.append(Panel(Scale("time [s]", "s"), Scale(name), marks, height_px=190))
     return Chart(tuple(panels), is_linked=True)
 
 

@@ -1,14 +1,9 @@
 """Report of several recordings of one unit, diagnosed together."""
 
-from collections.abc import Sequence
-from functools import partial
 from typing import Any
-
-import numpy as np
 
 from trihedron.records.recording import as_arguments, distinct_names
 from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
-from trihedron.report.chart import ROW_PX, TWO_SIGMA, Chart, Level, Panel, Points, Scale, around_zero
 from trihedron.report.diagnosis_words import (
     level_of,
     p_in_words,
@@ -17,11 +12,11 @@ from trihedron.report.diagnosis_words import (
     value_in_words,
     verdict_in_words,
 )
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Paragraph, Section, Table
 from trihedron.report.findings import findings_block
 from trihedron.report.findings.wording import opening
 from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
-from trihedron.report.numbers import capital, listed, plain_number, with_sigma
+from trihedron.report.numbers import capital, listed, plain_number
 
 COLUMNS = 3
 LONGEST = 16
@@ -63,7 +58,6 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
             Section("Candidates", (Table(("effect", "score together"), tried, "The catalogue"),)),
         ),
         stated_level="bad" if doubted else "usable" if found.effects or alone else "good",
-        lead=_lead(found, names),
         next_step=_next_step(found, own, list(doubted)),
     )
 
@@ -76,15 +70,6 @@ def _doubted(found: SharedDiagnosis, names: list[str]) -> dict[str, str]:
         if serious := serious_beside(one, own):
             out[name] = opening(serious.seen)
     return out
-
-
-def _lead(found: SharedDiagnosis, names: list[str]) -> Picture | None:
-    """The strongest shared effect with its size in every recording."""
-    if not found.effects:
-        return None
-    strongest = found.effects[0]
-    caption = f"Parameters of {id_in_print(strongest.id)}, in all recordings together and in each; 95 % intervals."
-    return Picture("shared", caption, partial(shared_chart, strongest, names))
 
 
 def _next_step(found: SharedDiagnosis, own: list[str], doubted: list[str]) -> str:
@@ -151,26 +136,3 @@ def shared_diagnosis_record(found: SharedDiagnosis) -> dict[str, Any]:
         "candidates": [one.to_dict() for one in found.candidates],
         "diagnoses": [one.to_dict() for one in found.diagnoses],
     }
-
-
-def shared_chart(effect: SharedEffect, names: Sequence[str]) -> Chart:
-    """A panel per parameter: its value in all recordings together, then in each, with 95 % intervals."""
-    panels = []
-    rows = ("together", *names)
-    is_counted = max(map(len, names)) > LONGEST
-    beside = ("together", *(f"recording {k}" for k in range(1, len(names) + 1))) if is_counted else rows
-    place = -np.arange(1.0, len(rows) + 1.0)
-    for i, common in enumerate(effect.parameters):
-        found = [one[i] for one in (effect.parameters, *effect.each)]
-        scale, unit = parameter_unit(common.unit, max(abs(one.value) for one in found))
-        value, sigma = scale * np.array([(one.value, one.std) for one in found]).T
-        tips = [f"{row}: {with_sigma(v, s)} {unit}" for row, v, s in zip(rows, value, sigma, strict=True)]
-        marks = (
-            Level(x=0.0, name="no effect"),
-            Points(value[1:], place[1:], tips[1:], TWO_SIGMA * sigma[1:], "one recording", "c1", is_across=True),
-            Points(value[:1], place[:1], tips[:1], TWO_SIGMA * sigma[:1], "together", "accent", is_across=True),
-        )
-        name = parameter_in_print(common.name)
-        x = Scale(f"{name} [{unit}]", unit, includes=around_zero(value))
-        panels.append(Panel(x, Scale("", names=beside), marks, title=name, height_px=ROW_PX * (len(rows) + 1)))
-    return Chart(tuple(panels), columns=min(COLUMNS, len(panels)))
