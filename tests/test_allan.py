@@ -276,7 +276,7 @@ def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
         assert axes[0]["terms"]["N"]["value"] == pytest.approx(np.radians(0.05) * 2.0, rel=0.02)
         assert axes[5]["terms"]["N"]["value"] == pytest.approx(3.33e-3 * 9.80665 * 2.0, rel=0.02)
     assert main(["allan", str(path), *said[:4]]) == 0
-    assert "--gyro-lsb GYRO_LSB --accel-lsb ACCEL_LSB" in " ".join(capsys.readouterr().out.replace("\\\n", "").split())
+    assert "--gyro-lsb SIZE --accel-lsb SIZE" in " ".join(capsys.readouterr().out.replace("\\\n", "").split())
     assert "number and a unit" in rejected(capsys, "allan", path, *said[:-1], "3.33")
     # Readings in SI were multiplied, and N was a thousandth.
     in_si = tmp_path / "si.csv"
