@@ -21,7 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import trihedron
 from board import DECLARED, Board, counts_recording
-from trihedron.api.naming_columns import column_namer
+from trihedron.api.capturing import column_namer
 from trihedron.capture.recorder import Recorder
 from trihedron.capture.sources import open_source
 from trihedron.capture.timeline import Count

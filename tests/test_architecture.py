@@ -248,7 +248,7 @@ def test_a_refusal_is_told_from_a_defect():
 
 # Calls that a handler of ValueError may stand round; api/asking.py says what it catches in Python's words.
 CONVERSIONS = {
-    "api/naming_columns.py: float",
+    "api/capturing.py: float",
     "api/reading_arrays.py: np.ma.asanyarray",
     "api/asking.py: result_in_python",
     "api/asking.py: verb",

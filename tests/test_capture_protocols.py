@@ -9,7 +9,7 @@ import pytest
 
 import trihedron
 from board import DECLARED, counts_recording
-from trihedron.api.naming_columns import column_namer
+from trihedron.api.capturing import column_namer
 from trihedron.capture.sequence import Sequence
 from trihedron.cli import main
 from trihedron.protocols import decoder_factory, encoder_for

@@ -13,8 +13,7 @@ import pytest
 
 import trihedron
 from board import Board, counts_recording
-from trihedron.api.capturing import open_device
-from trihedron.api.naming_columns import column_namer
+from trihedron.api.capturing import column_namer, open_device
 from trihedron.arrivals import ClockFit, paced
 from trihedron.capture.detection import find_protocol
 from trihedron.capture.errors import CaptureError

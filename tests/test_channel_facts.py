@@ -13,7 +13,7 @@ from trihedron import calibrate, segment
 from trihedron.channel_facts.limits import find_limits, new_readings
 from trihedron.channel_facts.static_axes import adc_step, adc_steps
 from trihedron.records import Recording
-from trihedron.report.channels import channels_record, channels_table
+from trihedron.report.segments import channels_record, channels_table
 from trihedron.segment.means import left_by_rounding
 
 SCALE = 9.80665 / 16384

@@ -18,7 +18,7 @@ from trihedron.cli import COMMANDS, main
 from trihedron.errors import InputError
 from trihedron.records import Finding, Severity
 from trihedron.records.domains import DOMAINS
-from trihedron.report.calibration_pictures import uncalibrated_error
+from trihedron.report.calibration_charts import uncalibrated_error
 from trihedron.report.chart import Bars, Chart, Disc, Level, Line, Note, Panel, Points, Scale, Span
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Facts, Paragraph, Picture, Section, Table

@@ -30,10 +30,9 @@ from trihedron.diagnose.session.starting_point import linear_model, nominal, pri
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import InputError
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import Diagnosis, Verdict
+from trihedron.records.diagnosis import Diagnosis, SharedDiagnosis, Verdict
 from trihedron.records.domains import Domain, DomainTest, Where
 from trihedron.records.progress import Progress
-from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.session.model import Prior, SessionState
 
 

@@ -19,8 +19,7 @@ from trihedron.diagnose.effects.contract import DirectEffect, Effect
 from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
 from trihedron.diagnose.search import threshold
 from trihedron.probability import chdtrc
-from trihedron.records.diagnosis import EffectParameter
-from trihedron.records.shared_effects import SharedCandidate, SharedEffect
+from trihedron.records.diagnosis import EffectParameter, SharedCandidate, SharedEffect
 
 KNOWN = 1e-6
 """Relative precision, to that of the best direction, below which a recording does not determine a direction."""

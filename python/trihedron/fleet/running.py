@@ -15,8 +15,7 @@ from trihedron.errors import InputError
 from trihedron.files.calibration import plain
 from trihedron.files.output import write_whole
 from trihedron.fleet.logs import Job, find_jobs
-from trihedron.fleet.summary import FleetResult, summarise
-from trihedron.fleet.table import write_tables
+from trihedron.fleet.summary import FleetResult, summarise, write_tables
 from trihedron.fleet.work import Row, work
 from trihedron.records.progress import Progress
 

@@ -8,14 +8,16 @@ from trihedron.arrays import AXES, TINY, XYZ, FloatArray
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE
 from trihedron.report.axes import Axes, axes_of
-from trihedron.report.calibration_charts import correlations, excluded_moves, strong_correlations
-from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
-from trihedron.report.calibration_pictures import (
+from trihedron.report.calibration_charts import (
     before_words,
+    correlations,
+    excluded_moves,
     figure_blocks,
     lead_picture,
+    strong_correlations,
     uncalibrated_error,
 )
+from trihedron.report.calibration_fit import angles_of, fit_in_words, move_floor, residual_tables
 from trihedron.report.document import USE_IT, WITHIN, Block, Document, Facts, Paragraph, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.findings.wording import opening

@@ -5,11 +5,10 @@ import numpy as np
 from trihedron.records import Calibration, Finding, Recording, Segments
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import next_pose
-from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import plain_number, shown
-from trihedron.report.segments import recording_facts, signals_picture
+from trihedron.report.segments import channels_table, recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
 
 NONE = "–"

@@ -10,7 +10,13 @@ from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.chart import Chart
-from trihedron.report.diagnosis_charts import before_after_chart, noise_pictures
+from trihedron.report.diagnosis_charts import (
+    before_after_chart,
+    forest_picture,
+    noise_pictures,
+    strengths_picture,
+    traces_picture,
+)
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.diagnosis_numbers import (
@@ -20,7 +26,6 @@ from trihedron.report.diagnosis_numbers import (
     numbers_blocks,
     stages_blocks,
 )
-from trihedron.report.diagnosis_overview_charts import forest_picture, strengths_picture, traces_picture
 from trihedron.report.diagnosis_words import (
     NOT_JUDGED,
     findings_of,

@@ -21,8 +21,8 @@ from trihedron.records import (
 )
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.sessions import SessionsModel
-from trihedron.report.channels import logged_sensors
 from trihedron.report.noise_units import PER_UNIT
+from trihedron.report.segments import logged_sensors
 
 Columns = dict[str, Sequence[Any] | npt.NDArray[Any]]
 

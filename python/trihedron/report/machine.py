@@ -7,7 +7,7 @@ from trihedron.files.calibration import calibration_document, plain
 from trihedron.records import Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
 from trihedron.records.sessions import Session, SessionsModel
-from trihedron.report.channels import channels_record
+from trihedron.report.segments import channels_record
 from trihedron.sanitise import escaped_json
 
 

@@ -13,6 +13,7 @@ from trihedron.errors import InputError
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.files.output import write_whole
 from trihedron.records import Calibration, Noise, Recording, Segments, Verification
+from trihedron.records.diagnosis import SharedDiagnosis
 from trihedron.records.filter_noise import FilterNoise
 from trihedron.records.plan import ExperimentPlan
 from trihedron.records.ranking import Ranking
@@ -24,7 +25,6 @@ from trihedron.records.results import (
     SessionsResult,
     VerificationResult,
 )
-from trihedron.records.shared_effects import SharedDiagnosis
 from trihedron.report import document, frames, machine
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report

@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from trihedron.records.diagnosis import SharedDiagnosis, SharedEffect
 from trihedron.records.recording import as_arguments, distinct_names
-from trihedron.records.shared_effects import SharedDiagnosis, SharedEffect
 from trihedron.report.diagnosis_words import (
     level_of,
     p_in_words,
