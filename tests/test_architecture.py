@@ -246,14 +246,10 @@ def test_a_refusal_is_told_from_a_defect():
     assert [name for name, bases in errors if "ValueError" in bases] == ["checked.py: WrongTypeError"]
 
 
-# Calls that a handler of ValueError may stand round; api/asking.py says what it catches in Python's words.
+# Calls that a handler of ValueError may stand round.
 CONVERSIONS = {
     "api/capturing.py: float",
     "api/reading_arrays.py: np.ma.asanyarray",
-    "api/asking.py: result_in_python",
-    "api/asking.py: verb",
-    "api/asking.py: item.item",
-    "api/asking.py: hasattr",
     "fleet/running.py: json.loads",
     "fleet/running.py: path.read_text",
     "fleet/running.py: distributed.Client",

@@ -154,7 +154,7 @@ class _Front(ModuleType):
             value = getattr(import_module(_HOME[name]), name)
             if not isinstance(value, type):
                 # The command line calls the unwrapped functions, whose error messages name flags.
-                value = import_module("trihedron.api.asking").asked_in_python(value)
+                value = import_module("trihedron.report.in_python").asked_in_python(value)
         else:
             raise AttributeError(f"module 'trihedron' has no attribute {name!r}")
         super().__setattr__(name, value)

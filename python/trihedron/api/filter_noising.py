@@ -234,7 +234,7 @@ def _static_sensor(own: Noise, sensor: str, rest: StaticNoise, known: Static) ->
     """Filter noise of a sensor from this log's own static interval, ``rest``, with the static values."""
     return SensorFilterNoise(
         "gyroscope" if sensor == "gyroscope" else "accelerometer", UNITS[sensor], rest.N, rest.K, known.get(sensor),
-        BiasModel("walk", 0.0), unlike_axes(own.axes, UNITS[sensor]), is_only_static=True,
+        BiasModel("walk", 0.0), unlike_axes(own.axes, UNITS[sensor]),
     )  # fmt: skip
 
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.api.asking import asked_in_python
 from trihedron.api.reading import read
 from trihedron.arrays import AXES
 from trihedron.read import ReadError
 from trihedron.records import Recording
 from trihedron.records.checked import WrongTypeError, number_of
+from trihedron.report.in_python import asked_in_python
 from trihedron.units import AccelerationUnit, RateUnit
 
 

@@ -14,17 +14,16 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.reference import fit_references, turns_of_frame
 from trihedron.estimate.verification import reference_findings
-from trihedron.records import Calibration, Frame, Recording
+from trihedron.records import Calibration, Frame
 from trihedron.records.reference import AgainstReference, FitToReference
 
 
 @dataclass(frozen=True, eq=False)
 class ReferencesResult:
-    """The unit's ``calibration``; ``references`` are the fits to each of ``recordings``: bias, clock, error."""
+    """The unit's ``calibration``; ``references`` are the fits to each recording: bias, clock, error."""
 
     calibration: Calibration
     references: tuple[AgainstReference, ...]
-    recordings: tuple[Recording, ...]
 
     def __str__(self) -> str:
         from trihedron.report.reference import references_report
@@ -87,7 +86,7 @@ def calibrate_references(
     findings = [*said, *(finding for one in found for finding in one.findings)]
     if first.accelerometer is not None:
         findings += [found for log in logs for found in reference_findings(calibration, log, segment(log))]
-    return ReferencesResult(replace(calibration, findings=tuple(findings)), found, logs)
+    return ReferencesResult(replace(calibration, findings=tuple(findings)), found)
 
 
 def _with_repeatability(fits: Sequence[FitToReference]) -> FitToReference:

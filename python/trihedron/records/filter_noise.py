@@ -109,7 +109,6 @@ class SensorFilterNoise(Plain):
     reference: ReferenceWorth | None = None
     shares: tuple[Share, ...] = ()
     consistency: tuple[Nees, ...] = ()
-    is_only_static: bool = False
     is_settled: bool = True
     quietest: float = 0.0
 

@@ -103,15 +103,13 @@ class GaussMarkov:
 
 @dataclass(frozen=True)
 class SpectralLine:
-    """A sinusoid ``amplitude · sin(2π frequency t)`` found above the noise, with standard errors.
+    """A sinusoid ``amplitude · sin(2π frequency t)`` found above the noise.
 
     ``width_hz`` > 0: a resonance, whose power is spread over that width.
     """
 
     frequency_hz: float
     amplitude: float
-    sigma_amplitude: float
-    sigma_frequency_hz: float
     width_hz: float = 0.0
 
 
@@ -201,26 +199,9 @@ class NoiseAxis(Judged, Frozen):
             parts["lines"] = np.sum(each, axis=0)
         return parts
 
-    def variance_of_mean(self, window_s: float, session_s: float | None = None) -> float:
-        """Variance of the mean of ``window_s`` seconds (docs/noise.md, eq. 11).
-
-        Without ``session_s``: half the variance of the difference to the next such mean (the Allan variance), for a
-        bias that is estimated next to the window. With it: the variance about the mean of a session of that length,
-        for one bias that is fitted to all poses.
-        """
-        if not window_s > 0:
-            raise InputError(f"a window must last longer than 0 s, got {window_s}")
-        if session_s is None:
-            return float(self.allan_variance(window_s)[0])
-        if session_s < window_s:
-            raise InputError(f"a session of {session_s} s holds no window of {window_s} s")
-        Q, N, B, K, R = (self.fitted(term) for term in TermName)
-        t, d = window_s, session_s
-        total = 2 * Q**2 * (1 / t**2 - 1 / d**2) + N**2 * (1 / t - 1 / d) + B**2 / math.pi * math.log(d / t)
-        total += K**2 * (d - t) / 6 + R**2 * (d**2 - t**2) / 12
-        if self.gauss_markov is not None:
-            total += _gauss_markov_mean(self.gauss_markov, t) - _gauss_markov_mean(self.gauss_markov, d)
-        return total
+    def variance_of_mean(self, window_s: float) -> float:
+        """Variance of the mean of ``window_s`` seconds about the next such mean: the Allan variance."""
+        return float(self.allan_variance(window_s)[0])
 
     def optimal_averaging(self) -> tuple[float, float] | None:
         """Averaging time of least Allan deviation and that deviation; None when it still falls at the end of the log.
@@ -236,11 +217,6 @@ class NoiseAxis(Judged, Frozen):
         if place == len(tau) - 1 or variance[-1] < 1.02 * variance[place]:
             return None
         return float(tau[place]), float(np.sqrt(variance[place]))
-
-
-def _gauss_markov_mean(process: GaussMarkov, window_s: float) -> float:
-    ratio = process.correlation_time_s / window_s
-    return 2 * process.sigma_process**2 * ratio * (1 + ratio * math.expm1(-1 / ratio))
 
 
 def _gauss_markov_allan(process: GaussMarkov, tau: FloatArray) -> FloatArray:

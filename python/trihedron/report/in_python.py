@@ -1,6 +1,8 @@
-"""Texts that name command-line flags, rewritten with the parameters of the Python functions."""
+"""Calls from Python: errors and findings name parameters of functions in place of command-line flags."""
 
+import functools
 import re
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from typing import Any, TypeVar
@@ -33,6 +35,7 @@ _PARAMETERS = {f"--{name}": name.replace("-", "_") for name in _SAME.split()} | 
 _COMMAND = re.compile(r"(`trihedron \w+[^`]*`)")
 _MAPPING = re.compile(r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?")
 Value = TypeVar("Value")
+Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 
 @cache
@@ -76,3 +79,25 @@ def _in_python(record: Any) -> Any:
 
 def _has_findings(record: Any) -> bool:
     return is_dataclass(record) and not isinstance(record, type) and hasattr(record, "findings")
+
+
+def asked_in_python(verb: Verb) -> Verb:
+    """The verb with its error messages and findings in terms of Python parameters."""
+
+    @functools.wraps(verb)
+    def ask(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return result_in_python(verb(*args, **kwargs))
+        except ValueError as error:
+            said = in_python(str(error))
+            if said == str(error):
+                raise
+            try:
+                named = type(error)(said)
+            except TypeError:
+                named = ValueError(said)
+            raise named from None
+
+    # Pickle looks it up under its public name.
+    ask.__module__, ask.__qualname__ = "trihedron", verb.__name__
+    return ask  # type: ignore[return-value]

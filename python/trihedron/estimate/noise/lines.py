@@ -90,14 +90,11 @@ def _line(band: Ordinates, power: FloatArray, expected: FloatArray, near: slice)
     excess = np.maximum(power - expected, 0.0)
     total = float(max(np.sum(power - expected), np.max(excess)))
     amplitude = math.sqrt(2.0 * total / time_s)
-    level = float(np.mean(expected)) / float(band.count[0])
     frequency = float(np.sum(excess * band.frequency_hz[near]) / np.sum(excess))
     spread = math.sqrt(float(np.sum(excess * (band.frequency_hz[near] - frequency) ** 2) / np.sum(excess)))
     return SpectralLine(
         frequency_hz=frequency,
         amplitude=amplitude,
-        sigma_amplitude=math.sqrt(2.0 * level / time_s),
-        sigma_frequency_hz=math.sqrt(6.0 * level / time_s) / (math.pi * amplitude * time_s),
         width_hz=max(0.0, 2.0 * spread - 2.0 / time_s),
     )
 
