@@ -145,20 +145,17 @@ def before_a_tracker(seed, seconds):
     return log, ReferenceMotion(t[k], attitude=C[k], source="tracker")
 
 
-def stated(value, *, is_present):
-    """A term of the JSON of ``trihedron allan``."""
-    figures = dict.fromkeys(("estimate", "lower", "upper", "fitted"), value)
-    return {"present": is_present, "sigma": 0.0, "evidence": 0.0, **figures}
+def resting(seed=1, seconds=120, n=N):
+    rng = np.random.default_rng(seed)
+    m = 100 * seconds
+    force, rate = [0.0, 0.0, G] + 0.01 * rng.normal(size=(m, 3)), 10 * n * rng.normal(size=(m, 3))
+    return Recording.from_arrays(np.arange(m) / 100.0, force, rate)
 
 
 @pytest.fixture(scope="module")
 def static(tmp_path_factory):
     path = tmp_path_factory.mktemp("static") / "allan.json"
-    axes = [
-        {"unit": unit, "terms": {s: stated(v, is_present=s == "N") for s, v in (("N", n), ("K", n / 5))}}
-        for unit, n in (("rad/s", N), ("m/s^2", 1e-3))
-    ]
-    path.write_text(json.dumps({"rate_hz": 100.0, "axes": axes}))
+    path.write_text(json.dumps(trihedron.allan(resting(9, seconds=600)).to_dict()))
     return path
 
 
@@ -192,7 +189,8 @@ def test_a_healthy_gyro_before_a_good_truth_keeps_its_static_noise(found):
         ({"N": Bounded(0.0, 0.0, 4.0 * N, True)}, "upper limit", True),
         ({"shares": (Share("reference", 10.0, Bounded(0.97, 0.87, 1.0)),)}, "what little remains", True),
         ({"shares": (Share("reference", 10.0, Bounded(0.8, 0.7, 1.0)),)}, "what little remains", False),
-        ({"N": Bounded(N / 2.0, 0.45 * N, 0.55 * N), "static": None}, "filter-noise-below-quietest", True),
+        ({"N": Bounded(N / 2.0, 0.45 * N, 0.6 * N, True), "static": None}, "filter-noise-below-quietest", True),
+        ({"N": Bounded(N / 2.0, 0.45 * N, 0.6 * N, True), "static": None}, "filter-noise-uncertain", False),
         ({"N": Bounded(N, 0.9 * N, 1.1 * N), "static": None}, "filter-noise-below-quietest", False),
     ],
 )
@@ -233,19 +231,12 @@ def test_every_consumer_gets_both_sensors_in_its_own_unit(found, target):
     # Four digits, those of N before it is squared or after.
     numbers = [float(one) for one in re.findall(r"\d+\.\d+(?:e-\d+)?", text)]
     assert min(abs(one / wanted - 1.0) for one in numbers) < 1e-3
-    assert "static gyroscope: N 0.0002" in text
+    assert f"static gyroscope: N {whole.sensors[0].static.N.value:.4g}" in text
     assert "accelerometer: N 0.002 (0.001 to 0.003) m/s^2/sqrt(Hz), K below 0.0004 m/s^2/sqrt(s)" in text
     if target not in ("gtsam", "basalt"):
         assert yaml.safe_load(text.replace("%YAML:1.0", ""))
     if target == "basalt":
         assert json.loads(text)["value0"]["accel_bias_std"] == [4e-4] * 3
-
-
-def resting(seed=1, seconds=120, n=N):
-    rng = np.random.default_rng(seed)
-    m = 100 * seconds
-    force, rate = [0.0, 0.0, G] + 0.01 * rng.normal(size=(m, 3)), 10 * n * rng.normal(size=(m, 3))
-    return Recording.from_arrays(np.arange(m) / 100.0, force, rate)
 
 
 def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
@@ -257,6 +248,19 @@ def test_a_static_log_gives_back_the_static_values_with_a_factor_of_one():
     assert gyro.N.lower < N < gyro.N.upper
     assert gyro.K.is_limit
     assert any(f.code == "filter-noise-static" for f in found.findings)
+
+
+def test_without_a_reference_k_is_that_of_the_static_log_read_from_either_form(tmp_path):
+    noise = trihedron.allan(resting(2, seconds=1200))
+    path = tmp_path / "static.json"
+    path.write_text(json.dumps(noise.to_dict()))
+    by_result, by_file = (trihedron.filter_noise(resting(1), static=one) for one in (noise, path))
+    for sensor in by_result.sensors:
+        # Two minutes bound K of white noise some (20 min / 2 min)^(3/2) times as loosely as twenty.
+        assert sensor.K == sensor.static.K
+        assert sensor.K.upper < 0.2 * trihedron.filter_noise(resting(1)).sensor(sensor.sensor).K.upper
+        assert by_file.sensor(sensor.sensor) == sensor
+    assert "K of the gyroscope and accelerometer from" in " ".join(str(by_file).split())
 
 
 def test_without_a_reference_tilt_and_bias_over_moves_are_shown_beside_what_noise_predicts():

@@ -61,7 +61,9 @@ def noticed(one: SensorFilterNoise) -> Iterator[Finding]:
     sensor, N, has_static = one.sensor, one.N, one.static is not None
     if not one.is_settled:
         yield Finding.of("filter-noise-unsettled", sensor=sensor)
-    if N.is_limit:
+    if N.is_limit and not has_static and N.upper <= one.quietest:
+        yield Finding.of("filter-noise-below-quietest", sensor=sensor, quietest=one.quietest)
+    elif N.is_limit:
         yield Finding.of("filter-noise-uncertain", "limit", sensor=sensor, upper=N.upper, has_static=has_static)
     elif N.upper > N.lower * UNCERTAIN:
         yield Finding.of(
@@ -81,12 +83,8 @@ def noticed(one: SensorFilterNoise) -> Iterator[Finding]:
             horizon_s=mostly[1],
             has_static=has_static,
         )
-    if one.static is None:
+    if not has_static:
         yield Finding.of("filter-noise-no-static", sensor=sensor)
-        if N.upper < one.quietest:
-            yield Finding.of(
-                "filter-noise-below-quietest", sensor=sensor, in_file=N.filter_value, quietest=one.quietest
-            )
     if one.reference is not None and one.reference.follows:
         yield Finding.of("filter-noise-followed", sensor=sensor)
     if one.reference is not None and (one.K.is_limit or one.reference.slow.is_limit):

@@ -20,13 +20,11 @@ from trihedron.estimate.filter_noise.static_intervals import (
     tilt_over_moves,
     unlike_axes,
 )
-from trihedron.files.formats.contract import NoiseFigure
-from trihedron.files.noise import read_noise, read_noise_findings
-from trihedron.records import Finding, Noise, Recording, Segments, Severity
+from trihedron.files.noise import read_noise_axes, read_noise_findings
+from trihedron.records import Finding, Noise, NoiseAxis, Recording, Segments, Severity
 from trihedron.records.checked import WrongTypeError
 from trihedron.records.filter_noise import (
     BiasModel,
-    Bounded,
     FilterNoise,
     IntervalCheck,
     SensorFilterNoise,
@@ -42,8 +40,6 @@ UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 HORIZONS_S = (1.0, 10.0, 60.0)
 BAND_PART = 0.25
 """Vibration is measured above this fraction of the sampling rate, where rigid motion is negligible."""
-FILE_PART = 1.1
-"""Noise terms from a file get an interval of 10 % either way: they are of this kind of sensor, on another day."""
 Static = dict[str, StaticNoise]
 
 
@@ -110,7 +106,8 @@ def filter_noise(
     own = None if segments is None else _of_rest(recording, segments)
     # The log's own rest is no other log: its faults are those of the recording already.
     of_own = () if own is None else tuple(f for f in own.findings if f.code in NOT_OF_THE_SENSOR)
-    known, of_static, name = (_sensors(own), of_own, "") if static is None else _given(static)
+    rest = {} if own is None else _sensors(own.axes, own.findings)
+    known, of_static, name = (rest, of_own, "") if static is None else _given(static)
     if reference is None and own is None:
         raise InputError(_no_noise(recording, segments, "" if known else _in_counts(name), has_static=bool(name)))
     if name and not known:
@@ -125,12 +122,12 @@ def filter_noise(
         source, findings = motion.source, (*findings, *motion.findings, *of_motion, *about)
     else:
         assert own is not None
-        sensors = tuple(_static_sensor(own, sensor, rest, known) for sensor, rest in _sensors(own).items())
+        sensors = tuple(_static_sensor(own, sensor, one, known) for sensor, one in rest.items())
         if segments is not None:
             tilt, intervals = _between_intervals(recording, segments, known)
         findings = (*findings, Finding.of("filter-noise-static"), *too_sure(tilt))
     if static is not None:
-        findings = (*findings, *unlike_this_log(known, _sensors(own), sensors, name))
+        findings = (*findings, *unlike_this_log(known, rest, sensors, name))
     of_log = (recording.source, source, recording.rate_hz, band, recording.duration_s)
     return FilterNoise(sensors, *of_log, tilt, intervals, tuple(findings), name)
 
@@ -187,25 +184,22 @@ def _of_rest(recording: Recording, segments: Segments) -> Noise | None:
     )
     with suppress(*INPUT_ERRORS):
         found = allan(part)
-        return found if _sensors(found) else None
+        return found if _sensors(found.axes, found.findings) else None
     return None
 
 
-def _sensors(found: Noise | None) -> Static:
-    if found is None:
-        return {}
-    stated = {sensor: static_noise(found.axes, unit) for sensor, unit in UNITS.items()}
+def _sensors(axes: Sequence[NoiseAxis], findings: Sequence[Finding]) -> Static:
+    is_limit = any(finding.code in NOT_OF_THE_SENSOR for finding in findings)
+    stated = {sensor: static_noise(axes, unit, is_limit=is_limit) for sensor, unit in UNITS.items()}
     return {sensor: one for sensor, one in stated.items() if one is not None}
 
 
 def _given(static: Noise | str | os.PathLike[str]) -> tuple[Static, tuple[Finding, ...], str]:
     """Noise by sensor of a static log, findings on what makes it doubtful, and the log as an argument."""
     if isinstance(static, str | os.PathLike):
-        figures, _ = read_noise(static)
-        known = {name: StaticNoise(_bounded(one.N), _bounded(one.K)) for name, one in figures.items()}
-        name, said = shlex.quote(os.fspath(static)), read_noise_findings(static)
+        name, said, axes = shlex.quote(os.fspath(static)), read_noise_findings(static), read_noise_axes(static)
     elif isinstance(static, Noise):
-        known, name, said = _sensors(static), as_arguments(static.source), static.findings
+        name, said, axes = as_arguments(static.source), static.findings, static.axes
     else:
         raise WrongTypeError(
             f"static is what trihedron.allan found, or the name of a file, not {type(static).__name__}."
@@ -215,7 +209,7 @@ def _given(static: Noise | str | os.PathLike[str]) -> tuple[Static, tuple[Findin
         if one.severity is Severity.SERIOUS or one.code in NOT_OF_THE_SENSOR:
             is_grave, seen = one.severity is Severity.SERIOUS, words("quoted", sentence=one.seen)
             doubts.append(Finding.of("filter-noise-static", "doubted" if is_grave else "noted", name=name, seen=seen))
-    return known, tuple(doubts), name
+    return _sensors(axes, said), tuple(doubts), name
 
 
 def _in_counts(name: str) -> str:
@@ -225,15 +219,16 @@ def _in_counts(name: str) -> str:
     )
 
 
-def _bounded(figure: NoiseFigure) -> Bounded:
-    value, is_limit = figure.value, figure.is_limit
-    return Bounded(0.0 if is_limit else value, 0.0 if is_limit else value / FILE_PART, value * FILE_PART, is_limit)
-
-
 def _static_sensor(own: Noise, sensor: str, rest: StaticNoise, known: Static) -> SensorFilterNoise:
-    """Filter noise of a sensor from this log's own static interval, ``rest``, with the static values."""
+    """Filter noise of a sensor from this log's own static interval, ``rest``, with the static values.
+
+    An interval of seconds bounds K loosely: K is the static log's where that is within the bound.
+    """
+    K, static = rest.K, known.get(sensor)
+    if static is not None and K.is_limit and static.K.filter_value < K.upper:
+        K = static.K
     return SensorFilterNoise(
-        "gyroscope" if sensor == "gyroscope" else "accelerometer", UNITS[sensor], rest.N, rest.K, known.get(sensor),
+        "gyroscope" if sensor == "gyroscope" else "accelerometer", UNITS[sensor], rest.N, K, static,
         BiasModel("walk", 0.0), unlike_axes(own.axes, UNITS[sensor]),
     )  # fmt: skip
 

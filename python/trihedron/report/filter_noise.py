@@ -135,7 +135,7 @@ def _factor(value: Bounded, static: Bounded | None) -> str:
 
 
 def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
-    facts = [("for the filter", f"from {_beside(found)}{escaped(found.source)}")]
+    facts = [("for the filter", f"from {_beside(found)}{escaped(found.source)}{_of_static(found)}")]
     if any(one.static is not None for one in found.sensors):
         facts.append(("static", f"from {escaped(found.static_source) or OWN_REST}"))
     if found.reference_source:
@@ -158,7 +158,9 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
         said += "error, vibration and bias are in the difference; the heading is not seen)"
         facts.append(("tilt error after a rotation", said))
     if found.intervals is not None:
-        facts += _of_intervals(found.intervals)
+        gyro = found.sensor("gyroscope")
+        is_limit = gyro is not None and gyro.static is not None and gyro.static.K.is_limit
+        facts += _of_intervals(found.intervals, is_limit=is_limit)
     return tuple(facts)
 
 
@@ -167,11 +169,19 @@ def _beside(found: FilterNoise) -> str:
     return "" if found.reference_source else "the longest static interval of "
 
 
-def _of_intervals(intervals: IntervalCheck) -> list[tuple[str, str]]:
+def _of_static(found: FilterNoise) -> str:
+    """Whose K comes from the static log, whose interval bounds it better than that of this log."""
+    named: list[str] = [
+        one.sensor for one in found.sensors if one.is_only_static and one.static and one.K == one.static.K
+    ]
+    return f"; K of the {listed(named)} from {escaped(found.static_source)}" if named and found.static_source else ""
+
+
+def _of_intervals(intervals: IntervalCheck, *, is_limit: bool) -> list[tuple[str, str]]:
     change, predicted = (plain_number(degrees_from_radians(v), 2) for v in (intervals.bias_change, intervals.predicted))
     spread = plain_number(100.0 * intervals.gravity_spread, 2)
-    bias = f"changes by {change} °/s rms; static N and K predict {predicted} °/s (temperature and g-sensitivity are in "
-    bias += "the difference)"
+    bias = f"changes by {change} °/s rms; static N and K predict {'at most ' if is_limit else ''}{predicted} °/s "
+    bias += "(temperature and g-sensitivity are in the difference)"
     gravity = f"differs by {spread} % rms over {intervals.n} (residual calibration error of the accelerometer)"
     return [("bias between static intervals", bias), ("gravity in static intervals", gravity)]
 

@@ -29,6 +29,7 @@ from trihedron.records import Finding, Recording
 from trihedron.records.filter_noise import (
     CAUSES,
     BiasModel,
+    Bounded,
     Cause,
     Nees,
     ReferenceWorth,
@@ -151,6 +152,9 @@ def _sensor(
         # The difference contains the reference's error as much as the sensor's: N is the static one.
         assert static is not None
         N, K = static.N, replace(K, lower=0.0, is_limit=True)
+    if static is None and N.upper < stretches[0].quietest:
+        # The quietest second contains the static noise; a reference computed from these readings hides part of it.
+        N = Bounded(N.value, N.lower, stretches[0].quietest, True)
     tilt = None if is_gyro else asked.gravity_m_s2 * np.array([1.0, white_rad * np.sqrt(BLOCK_S)])
     # Of a horizon longer than every stretch nothing is seen.
     longest_s = max(float(one.time_s[-1] - one.time_s[0]) for one in stretches)

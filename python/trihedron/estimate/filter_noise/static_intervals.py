@@ -18,10 +18,15 @@ LONGEST_MOVE_S = 60.0
 """Longest move that is used: over more than a minute the bias may drift arbitrarily."""
 
 
-def static_noise(axes: Sequence[NoiseAxis], unit: str) -> StaticNoise | None:
-    """Static N and K, rms over the axes with this unit, with 95 % intervals; None where no axis has the unit."""
+def static_noise(axes: Sequence[NoiseAxis], unit: str, *, is_limit: bool = False) -> StaticNoise | None:
+    """Static N and K, rms over the axes with this unit, with 95 % intervals; None where no axis has the unit.
+
+    ``is_limit``: slow changes of the log are not all noise, and K is an upper limit.
+    """
     own = [axis for axis in axes if axis.unit == unit]
-    return StaticNoise(_pooled(own, TermName.WHITE), _pooled(own, TermName.RATE_RANDOM_WALK)) if own else None
+    if not own:
+        return None
+    return StaticNoise(_pooled(own, TermName.WHITE), _pooled(own, TermName.RATE_RANDOM_WALK, is_limit=is_limit))
 
 
 def unlike_axes(axes: Sequence[NoiseAxis], unit: str) -> tuple[Bounded, ...]:
@@ -32,11 +37,11 @@ def unlike_axes(axes: Sequence[NoiseAxis], unit: str) -> tuple[Bounded, ...]:
     return tuple(Bounded(t.value, t.lower, t.upper, not t.is_present) for t in each)
 
 
-def _pooled(axes: Sequence[NoiseAxis], term: TermName) -> Bounded:
+def _pooled(axes: Sequence[NoiseAxis], term: TermName, *, is_limit: bool = False) -> Bounded:
     terms = [axis.terms[term] for axis in axes]
-    value, is_limit = of_axes(terms)
-    if is_limit:
-        return Bounded(0.0, 0.0, value, True)
+    value, is_absent = of_axes(terms)
+    if is_absent or is_limit:
+        return Bounded(0.0, 0.0, rms_of(np.array([one.upper for one in terms])), True)
     # Errors of the axes are independent: variances add.
     spread = math.sqrt(sum(one.sigma**2 * one.value**2 for one in terms)) / (len(terms) * max(value, TINY))
     factor = math.exp(NORMAL_95 * spread / max(value, TINY))

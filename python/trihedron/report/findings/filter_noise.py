@@ -31,12 +31,12 @@ ENTRIES = {
         "Give a static log of the unit with --static STATIC.",
     ),
     ("filter-noise-below-quietest", "", WARNING): Words(
-        "N of the {sensor}, {in_file:.3g}, is less than the noise density in the log's quietest second, "
-        "{quietest:.3g}.",
+        "N of the {sensor} beside this reference is less than the noise density in the log's quietest second, "
+        "{quietest:.3g}, which is stated as its upper limit.",
         "A reference computed with this unit's own readings (a filter or smoother) repeats part of their noise; or "
         "that second contains vibration.",
-        "Give a static log of the unit with --static STATIC; until then replace N {in_file:.3g} of the {sensor} by "
-        "{quietest:.3g} in the filter.",
+        "Give a static log of the unit with --static STATIC; with the limit as N a filter trusts the {sensor} less "
+        "than it could.",
     ),
     ("filter-noise-not-separated", "", NOTE): Words(
         "Bias random walk of the {sensor} and the slow error of the reference are not separated here: the one that is "
