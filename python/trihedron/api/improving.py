@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from trihedron.api.driving import SCATTER, MovedAlike, bias_scatter, flicker_of_poses
+from trihedron.api.noise_from_poses import noise_from_poses
 from trihedron.arrays import AXES, FloatArray
-from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.fitted import model_of_diagnosis
 from trihedron.comparison.frames import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
@@ -21,23 +21,14 @@ from trihedron.comparison.rows import SENSOR
 from trihedron.comparison.slow import white_and_quantisation
 from trihedron.documents import parse_toml
 from trihedron.files.scenario import improved_scenario
-from trihedron.records.pose_noise import PoseNoise
 from trihedron.records.results import DiagnosisResult
 from trihedron.simulate import (
     Drift,
-    NoiseTerms,
     Scenario,
-    Smoother,
     diagnosed_sizes,
-    low_pass_like,
-    noise_of_octaves,
     read_scenario,
     scenario_from_table,
 )
-
-FEWEST_OCTAVES = 4
-N_FREQUENCIES = 256
-"""Number of evenly spaced frequencies up to half the rate at which a filter's gain is compared."""
 
 
 @dataclass(frozen=True)
@@ -99,30 +90,6 @@ def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
     return {key: ratio for key, ratio in ratios.items() if not AIMED_AT[0] <= ratio <= AIMED_AT[1]}
 
 
-def _of_poses(seen: Sampled) -> dict[str, tuple[NoiseTerms, Smoother]]:
-    """Noise terms and low-pass of each sensor, fitted to the octaves of the noise inside the recording's poses."""
-    out = {}
-    for name, axes in seen.noise.items():
-        # Octaves common to all axes, below half the rate.
-        by_axis = [{o.low_hz: o.density for o in axis.octaves} for axis in axes]
-        bands = [o for o in axes[0].octaves if all(o.low_hz in one for one in by_axis)]
-        bands = [o for o in bands if o.high_hz <= 0.5 * seen.rate_hz]
-        if len(bands) < FEWEST_OCTAVES:
-            continue
-        rounding = np.array([axis.step**2 / (12.0 * seen.rate_hz) for axis in axes])
-        density = np.array([[one[o.low_hz].value for one in by_axis] for o in bands])
-        relative = np.array([[one[o.low_hz].sigma_log for one in by_axis] for o in bands])
-        out[str(name)] = noise_of_octaves(
-            np.array([(o.low_hz, o.high_hz) for o in bands]),
-            np.maximum(density - rounding, 1e-3 * density),
-            relative,
-            1.0 / seen.rate_hz,
-            _low_pass(axes),
-            _white(axes),
-        )
-    return out
-
-
 def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]]:
     """N and Q of all axes of a sensor from one fit to its octaves; empty where some axis does not determine them."""
     axes = [white_and_quantisation(axis) for sensor, each in seen.noise.items() if sensor == name for axis in each]
@@ -133,33 +100,6 @@ def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]
         "N": [math.sqrt(one.white) for one in known],
         "Q": [math.sqrt(one.quantisation) if one.is_shown else 0.0 for one in known],
     }
-
-
-def _low_pass(axes: Sequence[PoseNoise]) -> Smoother | float | None:
-    """The low-pass whose gain is nearest to the filter detected on all axes; an empty one where none is detected.
-
-    Axes with different corners contain motion of the hand or the support: then the geometric mean of the corners [Hz],
-    near which the octaves determine the filter; ``None`` where half of the axes or more show none.
-    """
-    rate = axes[0].rate_hz
-    seen = [(one.corner_hz.value, one.corner_shape) for one in axes if one.corner_hz is not None]
-    if not seen:
-        return Smoother()
-    if len(seen) < len(axes) or len(set(seen)) > 1:
-        mean = math.exp(sum(math.log(corner) for corner, _ in seen) / len(seen))
-        return mean if 2 * len(seen) > len(axes) else None
-    frequency_hz = rate * (np.arange(N_FREQUENCIES) + 0.5) / (2 * N_FREQUENCIES)
-    return low_pass_like(frequency_hz, gain_of(frequency_hz, *seen[0], rate), 1.0 / rate)
-
-
-def _white(axes: Sequence[PoseNoise]) -> list[tuple[float, float] | None]:
-    """N of every axis with its relative error, where all axes show one filter or none.
-
-    Where the corners differ, the noise below them includes motion.
-    """
-    if len({(one.corner_hz, one.corner_shape) for one in axes}) > 1:
-        return [None] * len(axes)
-    return [None if one.white is None else (one.white.value, one.white.sigma_log) for one in axes]
 
 
 def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
@@ -212,7 +152,7 @@ def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosis
 
 def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
     seen = sampled(found.recording, found.segments.poses, model_of_diagnosis(found))
-    poses = _of_poses(seen)
+    poses = {str(sensor): noise_from_poses(axes) for sensor, axes in seen.noise.items()}
     for name in ("accelerometer", "gyroscope"):
         differing = [n for n in found.noise_compared if n.significant and n.sensor == name]
         terms: dict[str, list[float]] = {}
@@ -225,8 +165,9 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
             elif n.term == "resolution" and n.recording is not None:
                 tables[name].setdefault("adc", {})["lsb"] = n.recording
         # A scenario without noise gets the recording's, whether or not the comparison of noise has a result.
-        if name in poses and (not any(had.N) or any(n.term in ("octave", "bandwidth") for n in differing)):
-            noise, low_pass = poses[name]
+        own = poses.get(name)
+        if own is not None and (not any(had.N) or any(n.term in ("octave", "bandwidth") for n in differing)):
+            noise, low_pass = own
             terms["N"] = list(noise.N)
             if low_pass.corner_hz > 0.0:
                 tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}

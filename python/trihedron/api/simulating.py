@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
+import numpy as np
+
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units
+from trihedron.api.noise_from_poses import noise_from_poses
 from trihedron.api.reading import AnyRecording, recording_of
-from trihedron.records import Recording, Truth
+from trihedron.estimate.noise.poses import noise_of_poses
+from trihedron.records import Calibration, Recording, Segments, Truth
 from trihedron.records.checked import WrongTypeError
 from trihedron.segment import segment_recording
+from trihedron.sensor_model import axis_scales
 from trihedron.simulate import (
+    NoiseTerms,
     Scenario,
+    Smoother,
     list_scenarios,
     read_scenario,
     scenario_by_name,
     twin_scenario,
 )
 from trihedron.simulate import simulate as run
+from trihedron.simulate.readout import triple
 
 
 def simulate(scenario: str | os.PathLike[str] | Scenario, seed: int = 0) -> tuple[Recording, Truth]:
@@ -97,4 +106,18 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
     """
     recording, known = recording_of(recording), calibration_of(calibration)
     check_units(known, recording)
-    return run(twin_scenario(recording, segment_recording(recording), known), seed)
+    return run(scenario_like(recording, segment_recording(recording), known), seed)
+
+
+def scenario_like(recording: Recording, segments: Segments, calibration: Calibration) -> Scenario:
+    """The scenario of a digital twin; raises ``InputError`` where a sensor or poses of 32 readings are missing."""
+    noise: dict[str, tuple[NoiseTerms, Smoother]] = {}
+    ranges = [(pose.start, pose.stop) for pose in segments.poses]
+    for name in ("accelerometer", "gyroscope"):
+        readings, sensor = getattr(recording, name), getattr(calibration, name)
+        if readings is None or sensor is None or not ranges:
+            continue
+        axes = noise_of_poses(readings * axis_scales(sensor.S), recording.rate_hz, ranges)
+        white = triple(np.array([one.reading_sigma for one in axes]) / math.sqrt(recording.rate_hz))
+        noise[name] = noise_from_poses(axes) or (NoiseTerms(N=white), Smoother())
+    return twin_scenario(recording, segments, calibration, noise)

@@ -5,6 +5,7 @@ accelerations, with a slow rotation about a level axis added so that each ends i
 digital twin therefore differ by what the calibration does not explain.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,9 @@ from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion.attitude import VERTICAL, attitude_with_up, rotation_of, shortest_turn, unit
 from trihedron.simulate.motion.plan import attitudes_of_replay
 from trihedron.simulate.motion.steps import Motion, Pose, Quaternion, Replay, Step
-from trihedron.simulate.readout import Adc, matrix3, sense_axes, triple
+from trihedron.simulate.noise import NoiseTerms
+from trihedron.simulate.readout import Adc, Smoother, matrix3, triple
 from trihedron.simulate.scenario import Clock, Environment, Scenario
-from trihedron.simulate.twin_noise import noise_of_poses
 
 
 def twin_motion(recording: Recording, segments: Segments, calibration: Calibration) -> Motion:
@@ -41,19 +42,25 @@ def twin_motion(recording: Recording, segments: Segments, calibration: Calibrati
     return _motion(recording.time_s, (force, rate), segments, calibration)
 
 
-def twin_scenario(recording: Recording, segments: Segments, calibration: Calibration) -> Scenario:
-    """A scenario whose simulation repeats a recording; raises ``InputError`` as :func:`twin_motion`."""
+def twin_scenario(
+    recording: Recording,
+    segments: Segments,
+    calibration: Calibration,
+    noise: Mapping[str, tuple[NoiseTerms, Smoother]],
+) -> Scenario:
+    """A scenario whose simulation repeats a recording with the ``noise`` and low-pass of each sensor.
+
+    Raises ``InputError`` as :func:`twin_motion`.
+    """
     motion = twin_motion(recording, segments, calibration)
     assert calibration.gyroscope is not None  # twin_motion checks it
-    poses = [(pose.start, pose.stop) for pose in segments.poses]
 
     def sensed(sensor: SensorCalibration, name: str) -> dict[str, Any]:
         raw, step, S = _filled(getattr(recording, name)), recording.facts.of(name).common_step, matrix3(sensor.S)
-        _, gain = sense_axes(S, name)
-        noise, low_pass = noise_of_poses(raw / gain, poses, 1.0 / recording.rate_hz, step / gain)
+        terms, low_pass = noise[name]
         adc = Adc(step, *(recording.facts.of(name).adc_range(raw) or ()))
         unit = getattr(recording, f"{name}_unit")
-        return {"S": S, "b": triple(sensor.b), "unit": unit, "noise": noise, "noise_filter": low_pass, "adc": adc}
+        return {"S": S, "b": triple(sensor.b), "unit": unit, "noise": terms, "noise_filter": low_pass, "adc": adc}
 
     return Scenario(
         motion=motion,

@@ -1,7 +1,4 @@
-"""Noise in the poses of a recording, for its digital twin: N, B and the low-pass that filters them.
-
-For each of a list of filters N² and B² are fitted, non-negative, to the pooled Allan variance; the best filter is kept.
-"""
+"""Noise in the poses of a recording, for its digital twin: N, B and the low-pass that filters them."""
 
 from collections.abc import Sequence
 
@@ -21,34 +18,12 @@ FILTER_EARNS = 16.0
 """Smallest gain in twice the log-likelihood for a low-pass over none; the same as where a corner is measured."""
 FLICKER_EARNS = 6.63
 """Smallest gain in twice the log-likelihood for flicker over none: the 1 % point of χ² with one degree of freedom."""
-NEAR = 0.3
-"""Largest difference of ln(corner) from a known corner; neighbouring corners tried differ by about as much."""
 HIDDEN = 1e-2
 """Power gain below which the ADC's rounding and spectral leakage hide the shape of a filter."""
 LOWEST, HIGHEST = 5e-3, 2.0
 """Corner frequencies searched, as fractions of the sampling rate: 1/100 to 4 times the Nyquist frequency."""
 SHAPES = 0.1
 """Relative model error of a density: lines and sharper filters are not represented by two terms and a low-pass."""
-
-
-def noise_of_poses(
-    signal: FloatArray, poses: Sequence[tuple[int, int]], dt: float, step: FloatArray | float = 0.0
-) -> tuple[NoiseTerms, Smoother]:
-    """Terms per axis of (n, 3) readings inside the poses ``[start, stop)``, and the low-pass that all axes share.
-
-    The rounding noise ``step``²/12 of the ADC is subtracted. A pose contributes cluster times up to a third of its own.
-    """
-    steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
-    measured = [_pooled(signal[:, k], poses, float(steps[k])) for k in range(3)]
-    filters = _filters(dt)
-    windows = [_windows(axis[0]) for axis in measured]
-    powers = [_power(low_pass, dt) for low_pass in filters]
-    fits = [
-        [_fit(axis, dt, window @ power) for axis, window in zip(measured, windows, strict=True)] for power in powers
-    ]
-    best = int(np.argmin([sum(misfit for _, misfit in fit) for fit in fits]))
-    N, B = (triple(column) for column in np.array([terms for terms, _ in fits[best]]).T)
-    return NoiseTerms(N=N, B=B), filters[best]
 
 
 def _filters(dt: float) -> list[Smoother]:
@@ -64,15 +39,15 @@ def noise_of_octaves(
     density: FloatArray,
     relative: FloatArray,
     dt: float,
-    low_pass: Smoother | float | None = None,
+    low_pass: Smoother | None = None,
     white: Sequence[tuple[float, float] | None] = (None, None, None),
 ) -> tuple[NoiseTerms, Smoother]:
     """Terms per axis and the low-pass that all axes share, from mean densities in frequency bands.
 
     ``bands_hz`` (m, 2), ``density`` (m, 3) two-sided, unit²/Hz (that of white noise is N²), ``relative`` (m, 3) their
-    relative standard errors. ``low_pass``: the filter if known; or its approximate corner [Hz], and the best of those
-    tried near it is taken; or None, and a filter must gain ``FILTER_EARNS`` over none, because one fits any coloured
-    noise. ``white``: N of each axis and its relative error where measured below a low-pass; it adds a density of N.
+    relative standard errors. ``low_pass``: the one detected, its corner 0 where there is none; or None, and a filter
+    must gain ``FILTER_EARNS`` over none, because one fits any coloured noise. ``white``: N of each axis and its
+    relative error where measured below a low-pass; it adds a density of N.
     """
     frequency_hz = _FREQUENCIES / (2.0 * np.pi * dt)
     inside = [(low <= frequency_hz) & (frequency_hz < high) for low, high in bands_hz]
@@ -93,13 +68,12 @@ def noise_of_octaves(
             misfit += own
         return terms, misfit
 
-    if not isinstance(low_pass, Smoother):
-        filters = _filters(dt)
+    if low_pass is None or low_pass.corner_hz > 0.0:
+        # The detected filter and those tried: where noisy poses determined its corner, a typical one has another.
+        filters = [*_filters(dt), *([] if low_pass is None else [low_pass])]
         misfits = [fitted(one)[1] for one in filters]
-        corner_hz = low_pass
-        near = [k for k in range(1, len(filters)) if corner_hz and abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
-        best = min(near or range(len(filters)), key=lambda k: misfits[k])
-        low_pass = filters[best if near or misfits[0] - misfits[best] > FILTER_EARNS else 0]
+        best = int(np.argmin(misfits))
+        low_pass = filters[best if low_pass is not None or misfits[0] - misfits[best] > FILTER_EARNS else 0]
     # Above the corner rounding and the filter's shape dominate: no octave there separates white noise from flicker.
     n_below = int(np.count_nonzero(bands_hz[:, 0] < low_pass.corner_hz))
     below = slice(n_below if low_pass.corner_hz > 0.0 and n_below >= FEWEST_BELOW else None)
@@ -151,60 +125,6 @@ def _non_negative(
         solution = found / norms
         model = np.maximum(design @ solution, least[1])
     return solution, float(misfit) ** 2 + 2.0 * float(np.sum(np.log(model)))
-
-
-def _pooled(x: FloatArray, poses: Sequence[tuple[int, int]], step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Cluster sizes [samples], Allan variances pooled over all poses, and their degrees of freedom, each (k,)."""
-    longest = max(stop - start for start, stop in poses)
-    clusters, variances, freedom = [], [], []
-    m = 1
-    while 3 * m <= longest:
-        total, count, independent = 0.0, 0, 0.0
-        for start, stop in poses:
-            n = stop - start
-            if n < 3 * m:
-                continue
-            sums = np.concatenate([[0.0], np.cumsum(x[start:stop] - x[start:stop].mean())])
-            means = (sums[m:] - sums[:-m]) / m
-            differences = means[m:] - means[:-m]
-            total += float(differences @ differences)
-            count += len(differences)
-            independent += n / m - 1.0
-        if independent < 4.0 and m > 1:
-            break
-        clusters.append(m)
-        variances.append(0.5 * total / count)
-        freedom.append(independent)
-        m *= 2
-    size = np.array(clusters, dtype=np.float64)
-    measured = np.maximum(np.array(variances) - step**2 / 12.0 / size, 0.0)
-    return size, measured, np.array(freedom)
-
-
-def _fit(
-    pooled: tuple[FloatArray, FloatArray, FloatArray], dt: float, passed: FloatArray
-) -> tuple[tuple[float, ...], float]:
-    """(N, B) and -2 log-likelihood; ``passed`` (k,) is the Allan variance of unit white noise after the low-pass."""
-    size, measured, freedom = pooled
-    if not np.any(measured > 0.0):
-        return (0.0, 0.0), 0.0
-    # Flicker is slow enough to pass the filter unchanged. No random walk is fitted: poses of seconds do not constrain
-    # how far it grows over the minutes between them.
-    flat = np.full(len(size), 2.0 * np.log(2.0) / np.pi)
-    design = np.column_stack([passed / dt, flat])
-    # Relative standard error of a variance with these degrees of freedom, with 3 % of model error in quadrature. It is
-    # relative to the model, so that a variance that is small by chance does not get the largest weight.
-    relative = np.hypot(np.sqrt(2.0 / freedom), 0.03)
-    least = measured.max() / size
-    solution, misfit = _non_negative(design, measured, relative, (0.1 * least, 1e-6 * least))
-    white, flicker = (float(v) for v in np.sqrt(solution))
-    return (white, flicker), misfit
-
-
-def _windows(size: FloatArray) -> FloatArray:
-    """(k, 8192) weight of a spectrum over (0, π) in the Allan variance at each cluster size (k,)."""
-    half = 0.5 * _FREQUENCIES
-    return np.array([2.0 / m**2 * np.sin(half * m) ** 4 / np.sin(half) ** 2 / len(half) for m in size])
 
 
 def _power(low_pass: Smoother, dt: float, turns: FloatArray = _FREQUENCIES) -> FloatArray:
