@@ -350,3 +350,41 @@ def test_the_best_averaging_time_is_that_of_a_minimum_which_the_log_shows(quiet)
         found = replace(axis, terms=terms, gauss_markov=None).optimal_averaging()
         assert (found is not None) is is_shown
         assert not is_shown or found[0] == pytest.approx(longest_s / times, rel=0.01)
+
+
+@pytest.mark.parametrize(("correlation_time_s", "is_telegraph"), [(0.05, False), (0.05, True)])
+def test_a_process_of_some_readings_is_no_low_pass_where_white_noise_stays_above_it(correlation_time_s, is_telegraph):
+    rng, n, step_s = np.random.default_rng(3), 90_000, 0.01
+    # Switches at twice the mean interval give a telegraph signal the spectrum of the process.
+    holds = rng.exponential(2.0 * correlation_time_s, size=n)
+    sign = 1.0 - 2.0 * (np.searchsorted(np.cumsum(holds), step_s * np.arange(n)) % 2)
+    decay = np.exp(-step_s / correlation_time_s)
+    smooth = lfilter([np.sqrt(1.0 - decay**2)], [1.0, -decay], rng.normal(size=n))
+    x = rng.normal(size=n) + (sign if is_telegraph else smooth)
+    (axis,) = identify_noise(x[:, None], 1.0 / step_s).axes
+    assert not {"spectrum-low-pass", "spectrum-unexplained"} & {finding.code for finding in axis.findings}
+    assert axis.terms["N"].lower < 0.1 < axis.terms["N"].upper
+    assert axis.gauss_markov.lower < 1.0 < axis.gauss_markov.upper
+    # Some 9000 correlation times in the log, beside white noise of the same variance.
+    assert axis.gauss_markov.correlation_time_s == pytest.approx(correlation_time_s, rel=0.1)
+
+
+def test_a_filter_far_below_the_rate_leaves_n_trusted_and_no_line():
+    rng = np.random.default_rng(1)
+    # First-order filter of 0.5 Hz in a log at 100 Hz: gain 1 - d over 1 - d z.
+    decay = np.exp(-2.0 * np.pi * 0.005)
+    x = lfilter([1.0 - decay], [1.0, -decay], 10.0 * rng.normal(size=200_000))
+    (axis,) = identify_noise(x[:, None], 100.0).axes
+    assert [(f.code, f.severity.value) for f in axis.findings if f.code.startswith("spectr")] == [
+        ("spectrum-low-pass", "warning")
+    ]
+    assert axis.terms["N"].lower < 1.0 < axis.terms["N"].upper
+
+
+def test_a_hum_of_varying_frequency_is_no_low_pass():
+    rng = np.random.default_rng(2)
+    # 31 Hz, random by 0.3 Hz over a minute: too broad for one line.
+    wander = lfilter([1.0], [1.0, -np.exp(-0.01 / 60.0)], rng.normal(size=180_000)) * 0.3 * np.sqrt(2 * 0.01 / 60.0)
+    x = 0.1 * rng.normal(size=180_000) + 0.2 * np.sin(2.0 * np.pi * np.cumsum(31.0 + wander) * 0.01)
+    (axis,) = identify_noise(x[:, None], 100.0).axes
+    assert "spectrum-low-pass" not in {finding.code for finding in axis.findings}

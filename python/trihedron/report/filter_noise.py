@@ -171,9 +171,7 @@ def _beside(found: FilterNoise) -> str:
 
 def _of_static(found: FilterNoise) -> str:
     """Whose K comes from the static log, whose interval bounds it better than that of this log."""
-    named: list[str] = [
-        one.sensor for one in found.sensors if one.is_only_static and one.static and one.K == one.static.K
-    ]
+    named: list[str] = [one.sensor for one in found.sensors if one.static and one.K == one.static.K]
     return f"; K of the {listed(named)} from {escaped(found.static_source)}" if named and found.static_source else ""
 
 

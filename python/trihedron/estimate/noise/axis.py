@@ -60,12 +60,13 @@ def identify_axis(
     def models(bands: Sequence[Ordinates]) -> list[Model]:
         return models_of(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
 
-    highest, at_nyquist = white_limit(bands, nyquist, masks)
+    rounding = blank.resolution**2 / (12.0 * blank.rate_hz)
+    highest, at_nyquist = white_limit(bands, nyquist, masks, rounding)
     likely = models(bands)
     lines, masks = find_lines(bands, likely[0], 1.0 / blank.rate_hz)
     if lines:
         findings.append(remarks.lines(lines, blank.unit))
-        highest, at_nyquist = white_limit(bands, nyquist, masks)
+        highest, at_nyquist = white_limit(bands, nyquist, masks, rounding)
         likely = models(bands)
     is_filtered = highest < nyquist
     if is_filtered or math.isnan(at_nyquist):

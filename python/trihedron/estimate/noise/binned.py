@@ -184,7 +184,7 @@ def models_of(
         spectrum = binned(bands, highest_hz, both)
     if tolerance > 0.0:
         spectrum = spectrum.capped(tolerance)
-    return _models(min(band.step_s / band.block for band in bands), spectrum)
+    return models_of_bins(min(band.step_s / band.block for band in bands), spectrum)
 
 
 def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[BoolArray]:
@@ -200,7 +200,7 @@ def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[Boo
     return out
 
 
-def _models(step_s: float, spectrum: BinnedSpectrum) -> list[Model]:
+def models_of_bins(step_s: float, spectrum: BinnedSpectrum) -> list[Model]:
     """The spectrum without a Gauss-Markov process, with one, or both where either may be."""
     # Filters change a spectrum by a few per cent: a process must be significant beyond this tolerance.
     capped, frequency = spectrum.capped(TOLERANCE_GAUSS_MARKOV), spectrum.frequency_hz

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from trihedron.arrays import TINY, BoolArray, FloatArray
-from trihedron.estimate.noise.binned import BinnedSpectrum, Model, binned
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model, binned, models_of_bins
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.probability import RARE_ALARM
 from trihedron.records.noise import SpectralLine
@@ -17,6 +17,8 @@ TOLERANCE = 0.05
 """Least relative deviation of a third of an octave from the fitted terms, if significant, that counts as filtering:
 noise terms are idealisations, and a smaller loss of white noise does not change a printed digit."""
 MOST_LINES = 24
+FLOOR = 0.5
+"""Least share of the sensor's white noise at Nyquist beside a process; a low-pass filter leaves none."""
 
 
 def find_lines(bands: Sequence[Ordinates], model: Model, step_s: float) -> tuple[list[SpectralLine], list[BoolArray]]:
@@ -107,30 +109,44 @@ def smooth_level(band: Ordinates, ratio: FloatArray) -> FloatArray:
         return np.ones_like(ratio)
     # Median of a chi-square per degree of freedom (Wilson-Hilferty).
     centre = (1.0 - 2.0 / (9.0 * band.count[0])) ** 3 if band.count[0] > 1 else 0.4549
-    level = np.median(ratio[: n * width].reshape(n, width), axis=1) / centre
-    places = (np.arange(n) + 0.5) * width
-    return np.asarray(np.maximum(np.interp(np.arange(len(ratio)), places, level), 1e-12))
+    level = np.log(np.maximum(np.median(ratio[: n * width].reshape(n, width), axis=1) / centre, 1e-12))
+    # Continued at both ends: behind a filter the spectrum is steep there.
+    level = np.r_[2.0 * level[0] - level[1], level, 2.0 * level[-1] - level[-2]]
+    places = (np.arange(-1, n + 1) + 0.5) * width
+    return np.asarray(np.exp(np.interp(np.arange(len(ratio)), places, level)))
 
 
 def white_limit(
-    bands: Sequence[Ordinates], nyquist_hz: float, masked: Sequence[BoolArray] | None
+    bands: Sequence[Ordinates], nyquist_hz: float, masked: Sequence[BoolArray] | None, rounding: float = 0.0
 ) -> tuple[float, float]:
     """Upper end [Hz] of the fit band, up to which the spectrum is a sum of terms, and power at Nyquist over the terms'.
 
     The upper two octaves of the band are compared, by thirds of an octave, with the fit of all terms; while one of them
-    deviates, the band is reduced by half an octave.
+    deviates, the band is reduced by half an octave. A process of some readings bends the spectrum as a filter does, but
+    leaves white noise above its corner, more than the ``rounding`` of the ADC (density): the band is then the whole.
     """
-    highest = nyquist_hz
-    while True:
-        spectrum = binned(bands, highest, masked)
-        if not _deviates(spectrum, highest) and not _droops(spectrum, highest):
+    whole, highest = binned(bands, nyquist_hz, masked), nyquist_hz
+    spectrum = whole
+    while _deviates(spectrum, highest) or _droops(spectrum, highest):
+        if highest == nyquist_hz and _has_floor(whole, highest, min(b.step_s / b.block for b in bands), rounding):
             break
-        if highest / np.sqrt(2.0) < 16.0 * spectrum.frequency_hz[0] or highest < nyquist_hz / 64:
+        if highest / np.sqrt(2.0) < 16.0 * spectrum.frequency_hz[0]:
             return highest, float("nan")
         highest /= np.sqrt(2.0)
-    whole = binned(bands, nyquist_hz, masked)
+        spectrum = binned(bands, highest, masked)
     top = whole.frequency_hz > 0.9 * nyquist_hz
-    return highest, float(np.mean(whole.ratio(spectrum.fit)[top])) if top.any() else math.nan
+    # Q of the band below would rise with frequency beyond it.
+    fit = spectrum.likelihood.fit((1, 2, 3))
+    return highest, float(np.mean(whole.ratio(fit)[top])) if top.any() else math.nan
+
+
+def _has_floor(whole: BinnedSpectrum, highest_hz: float, step_s: float, rounding: float) -> bool:
+    """Whether a Gauss-Markov process explains the spectrum beside white noise that is most of its uppermost part."""
+    spectrum = models_of_bins(step_s, whole)[-1].spectrum
+    strength = np.asarray(spectrum.fit.strength)
+    if len(strength) == len(whole.basis) or _deviates(spectrum, highest_hz):
+        return False
+    return bool(strength[1] - rounding > FLOOR * float(strength @ spectrum.basis[:, -1]))
 
 
 def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:

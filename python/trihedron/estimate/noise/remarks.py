@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 NAMED = 4
 """Most spectral lines that a finding lists one by one."""
+FALLEN = 0.95
+"""Power at Nyquist over the terms' below which a filter shows; vibration leaves it as it is."""
 UNLOGGED = (math.nan, math.nan)
 """Range of a temperature that was not logged."""
 
@@ -62,16 +64,12 @@ def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
 
 
 def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding:
-    """Finding for an upper end of the spectrum that no sum of noise terms explains (low-pass filtering)."""
+    """Finding for an upper end of the spectrum that no sum of noise terms explains: a filter's, or another cause's."""
     if math.isnan(at_nyquist):
         return Finding.of("spectrum-low-pass", "throughout")
-    return Finding.of(
-        "spectrum-low-pass",
-        "falls" if at_nyquist < 1.0 else "rises",
-        highest_hz=highest_hz,
-        nyquist_hz=nyquist_hz,
-        ratio=at_nyquist,
-    )
+    if at_nyquist < FALLEN:
+        return Finding.of("spectrum-low-pass", "falls", highest_hz=highest_hz, nyquist_hz=nyquist_hz, ratio=at_nyquist)
+    return Finding.of("spectrum-unexplained", "above", highest_hz=highest_hz, nyquist_hz=nyquist_hz, ratio=at_nyquist)
 
 
 def unexplained(deviation: float, frequency_hz: float) -> Finding:

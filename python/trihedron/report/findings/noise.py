@@ -89,19 +89,19 @@ _SPECTRUM = {
         "resampling, a narrow filter or periodic disturbance shapes the whole band.",
         "N and Q are not those of the sensor; log at its own rate without filtering.",
     ),
-    **{
-        ("spectrum-low-pass", way, WARNING): Words(
-            f"Above {{highest_hz:.3g}} Hz the spectrum leaves the noise terms and {way} to {{ratio:.3g %}} of them at "
-            "{nyquist_hz:.3g} Hz.",
-            cause,
-            "All terms are quoted from below; averaging times under half a period of that frequency show the filter, "
-            "and Q cannot be separated from it.",
-        )
-        for way, cause in (
-            ("falls", "a low-pass filter in the sensor or the logger, or averaging by a resampler."),
-            ("rises", "aliasing, resampling, a resonance or vibration."),
-        )
-    },
+    ("spectrum-low-pass", "falls", WARNING): Words(
+        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and falls to {ratio:.3g %} of them at "
+        "{nyquist_hz:.3g} Hz.",
+        "a low-pass filter in the sensor or the logger, or averaging by a resampler.",
+        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
+        "cannot be separated from it.",
+    ),
+    ("spectrum-unexplained", "above", WARNING): Words(
+        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms; at {nyquist_hz:.3g} Hz it is {ratio:.3g %} of "
+        "them.",
+        "vibration, a resonance, a line of varying frequency, aliasing or resampling.",
+        "All terms are quoted from below that frequency, where Q does not show.",
+    ),
     ("spectrum-unexplained", "", WARNING): Words(
         "Near {frequency_hz:.2g} Hz (means of {tau_s:.2g} s) the power lies {deviation:abs .0f %} "
         "{deviation:<below|above} the fitted terms.",
