@@ -83,18 +83,3 @@ pub fn two_levels(values: &[f64], mut levels: [f64; 2]) -> TwoLevels {
         is_second: weight.iter().map(|w| w[1] > 0.5).collect(),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::two_levels;
-
-    #[test]
-    fn levels_that_are_held_for_ten_values_are_found() {
-        let level = |i: usize| if i / 10 % 2 == 1 { 3.0 } else { -1.0 };
-        let noise = |i: usize| 0.2 * (1.7 * (i * i) as f64).sin();
-        let values: Vec<f64> = (0..200).map(|i| level(i) + noise(i)).collect();
-        let found = two_levels(&values, [-0.5, 2.0]);
-        assert!((found.levels[0] + 1.0).abs() < 0.06 && (found.levels[1] - 3.0).abs() < 0.06);
-        assert!((0..200).all(|i| found.is_second[i] == (level(i) > 0.0)));
-    }
-}

@@ -76,14 +76,6 @@ def test_the_straight_line_model_is_scipys_product_of_rotation_vectors():
         np.testing.assert_allclose(trihedron.integrate_rate(t, w, start=given, last_only=True), truth[-1], atol=2e-13)
 
 
-def test_samples_that_share_a_timestamp_do_not_turn_between_them():
-    t, w = uneven(600, 6.0), np.tile([0.3, -0.2, 0.5], (600, 1))
-    t[300] = t[299]
-    for between in ("constant", "linear", "coning"):
-        found = trihedron.integrate_rate(t, w, between=between)
-        np.testing.assert_allclose(found[300], found[299], atol=1e-15)
-
-
 def test_a_long_log_goes_on_from_any_of_its_samples():
     # Pieces of 32768 steps are worked on side by side: three of them, and a middle that lies at the end of none.
     rng = np.random.default_rng(6)

@@ -111,7 +111,9 @@ def test_a_gyro_rate_from_pose_to_pose_is_judged_unless_an_effect_or_a_stated_dr
     (first, _), (other, _) = (simulate(with_effect(SCENARIO, "gyro-g-sensitivity", matrix=matrix), k) for k in (11, 12))
     alone = trihedron.calibrate(first, gravity_m_s2=G)
     of_gyro = alone.gyroscope.quality
-    np.testing.assert_allclose(trihedron.verify(alone, first).verification.angle_deg, of_gyro.angle_deg, rtol=1e-6)
+    own = trihedron.verify(alone, first).verification
+    np.testing.assert_allclose(own.angle_deg, of_gyro.angle_deg, rtol=1e-6)
+    assert own.norm_rms == pytest.approx(alone.accelerometer.quality.rms, rel=1e-9)
     assert of_gyro.static_rate_rms > 8.0 * of_gyro.static_rate_floor
     assert "gyro rate in static poses" in str(alone).partition("cross-validated")[0]
     healthy = result.gyroscope.quality

@@ -14,12 +14,11 @@ from trihedron.diagnose.session.starting_point import start_state
 from trihedron.simulate import hand_session, scenario_by_name, simulate, with_effect
 
 
-@pytest.mark.parametrize("seed", [0, 5])
-def test_moves_across_lost_rows_are_as_uncertain_as_their_interpolation(seed):
-    motion = hand_session(20, pose_s=3.0, move_s=1.2, first_pose_s=6.0, layout=seed)
-    made, truth = simulate(unit_of(motion, seed, is_wide=True), seed)
+def test_moves_across_lost_rows_are_as_uncertain_as_their_interpolation():
+    motion = hand_session(20, pose_s=3.0, move_s=1.2, first_pose_s=6.0, layout=5)
+    made, truth = simulate(unit_of(motion, 5, is_wide=True), 5)
     # Up to three rows at a time, in a dozen places of every move of a second or two.
-    kept = np.random.default_rng(seed).random(made.n_samples) > 0.08
+    kept = np.random.default_rng(5).random(made.n_samples) > 0.08
     log = replace(
         made, time_s=made.time_s[kept], accelerometer=made.accelerometer[kept], gyroscope=made.gyroscope[kept],
         temperature_degc=None, supply_v=None,

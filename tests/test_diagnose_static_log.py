@@ -44,11 +44,6 @@ def test_a_static_log_of_a_healthy_sensor_is_not_testable_and_nothing_is_named()
     assert not any(t.disagrees for t in d.remaining)
     document = diagnosis_report(d)
     assert "`trihedron allan LOG`" in document.next_step
-    words = {row[0]: row[1] for row in document.sections[0].blocks[0].rows}
-    assert words["gyro rate in static poses"] == words["gravity error in static poses"] == "not judged"
-    assert words["noise within static poses"] == "agrees"
-    assert "not judged" in {mark.name for mark in document.lead.chart().panels[0].marks}
-    assert "Record 18 or more poses" in document.next_step
 
 
 def test_a_chamber_log_of_one_pose_tells_zeros_against_temperature():

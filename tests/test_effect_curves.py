@@ -173,7 +173,7 @@ def added(log, truth, of_rate):
 # A field whose horizontal part is a third of its vertical one is no g-sensitivity.
 @pytest.mark.parametrize("field", [(0.8, 0.3, -0.5), pytest.param((1.2, 0.6, -3.76), marks=pytest.mark.slow)])
 def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter(field):
-    log, truth, _, _ = session(4, 22)
+    log, truth, _, _ = session(4, 18)
     vector = Rotation.from_quat(np.roll(truth.attitude, -1, axis=1)).inv().apply(field)
     log = added(log, truth, 0.05 * DEG * vector @ np.array([[1.0, 0.2, 0], [0, -0.8, 0.5], [0.3, 0, 0.9]]))
     result = diagnose(log, gravity_m_s2=truth.gravity_m_s2)
@@ -188,7 +188,7 @@ def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter(fie
 
 
 def test_a_gyro_that_averages_over_many_samples_lags_and_has_no_other_effect():
-    log, truth, _, _ = session(7, 22)
+    log, truth, _, _ = session(7, 18)
     n = round(0.08 * log.rate_hz)
     before = np.concatenate([np.repeat(log.gyroscope[:1], n - 1, axis=0), log.gyroscope])
     mean = np.apply_along_axis(np.convolve, 0, before, np.full(n, 1.0 / n), mode="valid")

@@ -161,21 +161,6 @@ def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):
     assert "The 4 logs of logs are of SEVERAL devices." in str(result)
     assert not fleet_report(result.summary).is_trustworthy
     assert summarise(rows[4:], tmp_path).summary.mixed == ()
-    # One unit a file would separate the logs of the other device too; a wrong unit is no reason to record again.
-    action = "Read it with --gyro-unit rad/s."
-    misread = {
-        **row("third", "x.csv", one),
-        "is_trustworthy": False,
-        "serious": ["unit-contradicted"],
-        "reread": action,
-    }
-    said = fleet_report(summarise([*rows, misread], tmp_path).summary).next_step
-    assert said.startswith("Give each device of logs a folder of its own. For x.csv, by `trihedron calibrate`: read it")
-    assert "--serial '([^/]+)$' -o NEW_FOLDER" in fleet_report(summarise(rows[:4], tmp_path).summary).next_step
-    # One factor for all axes is another unit of measurement or clock, in a fleet as for many recordings.
-    common = one + np.repeat([0.0, 0.05, 0.0], [12, 3, 6])
-    rows = [row("logs", str(k), (one, common)[k % 2] + repeats[k], sigma) for k in range(4)]
-    assert summarise(rows, tmp_path).summary.mixed == ()
 
 
 @pytest.mark.filterwarnings("ignore")

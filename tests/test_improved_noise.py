@@ -11,7 +11,7 @@ from scipy.stats import binom
 import trihedron
 from diagnosed_session import unit_of
 from trihedron.api import improving
-from trihedron.api.driving import MovedAlike, _matched, bias_scatter
+from trihedron.api.driving import MovedAlike, bias_scatter
 from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.fitted import model_of_calibration
 from trihedron.comparison.noise import Sampled
@@ -102,19 +102,6 @@ def test_what_moves_miss_is_put_on_the_gyros_bias_in_moves_and_then_both_miss_al
     # A recording that misses no more than the scenario, but for chance (a sixth), needs little.
     little = bias_scatter(clean, beside(other), "gyroscope")
     assert little is None or max(little) < 0.4 * 2e-3
-
-
-def test_the_scatter_with_which_a_scenario_misses_alike_is_found_by_one_secant():
-    asked = []
-
-    def missed(square):
-        """A fit absorbs more than half of the scatter."""
-        asked.append(square)
-        return 1e-6 + 0.4 * square
-
-    # The first step is the expected one; the second is exact on a straight line, but for rounding.
-    assert _matched((0.0,) * 3, 5e-6, 1.0, missed) == pytest.approx((math.sqrt(1e-5),) * 3, rel=1e-9)
-    assert len(asked) == 3
 
 
 def sampled(Q, seed):

@@ -7,7 +7,6 @@ from scipy.interpolate import CubicSpline
 
 from trihedron import _core, probability
 from trihedron.diagnose.slope import smoothed_slope
-from trihedron.ranges import ranges_of
 
 RNG = np.random.default_rng(20261)
 TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
@@ -152,11 +151,6 @@ def test_a_slope_that_turns_within_a_few_widths_keeps_its_size(width, noise):
     assert np.abs(found - asked)[2000:-2000].max() < 0.015 * np.abs(asked).max()
 
 
-def test_runs_of_a_mask_are_found_up_to_both_its_ends():
-    for mask, runs in (("", []), ("1", [(0, 1)]), ("00", []), ("1101", [(0, 2), (3, 4)]), ("0110", [(1, 3)])):
-        assert ranges_of(np.array([c == "1" for c in mask], dtype=bool)) == runs
-
-
 def test_play_is_the_running_clip_of_its_definition():
     follower, expected = VALUES[0].copy(), []
     for row in VALUES:
@@ -270,8 +264,27 @@ def test_repeated_and_missing_readings_are_found_as_row_by_row(n):
     assert [(a, b) for a, b in zip(longest, start, strict=True)] == [longest_run(same[:, k]) for k in range(4)]
     bad = np.flatnonzero(~np.isfinite(readings).all(axis=1))
     assert (missing, first) == (len(bad), int(bad[0]) if len(bad) else None)
+    # Missing readings of an axis are skipped.
+    present = [axis[np.isfinite(axis)] for axis in readings.T]
+    assert _core.triad_largest_steps(readings) == [np.abs(np.diff(axis)).max(initial=0.0) for axis in present]
     cut = (n - 1) // 64 * 64
     np.testing.assert_array_equal(windows[: cut // 64], same[:cut].reshape(-1, 64, 4).sum(axis=1))
+
+
+def test_a_lone_reading_leaps_and_a_pulse_of_two_does_not():
+    rows = np.sin(np.arange(100)[:, None] / 30.0 + np.arange(3.0))
+    rows[40, 1] += 1.0
+    rows[60:62, 0] += 1.0
+    at, away, _ = _core.triad_leaps(rows, np.full(3, 1e-3), 8.0)
+    assert list(at) == [40]
+    assert away[0][1] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_block_sent_twice_is_a_copy_and_held_readings_and_a_periodic_motion_are_none():
+    rows, row = np.sin(np.arange(500.0)[:, None] ** 2 * [1.3, 2.7, 3.1]), np.arange(500)
+    assert _core.triad_copies(rows[np.where((row >= 200) & (row < 220), row - 30, row)], 100, 4) == [(200, 220)]
+    for other in (rows, rows[row // 4], rows[row % 50]):
+        assert _core.triad_copies(other, 100, 4) == []
 
 
 def test_phase_power_is_the_transform_of_shared_stamps():

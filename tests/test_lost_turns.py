@@ -88,15 +88,6 @@ def session(share, seed, move_s=2.0, grade="mpu"):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_three_per_cent_of_lost_samples_are_serious_and_about_as_many_as_said(seed):
-    log = session(0.03, seed)
-    (found,) = missing_samples(log, segment_recording(log), 1e-3)
-    assert found.severity is Severity.SERIOUS
-    # Some sixteen losses are seen, those of joints at which one would be: within four of their own errors.
-    assert abs(found.numbers["lost_share"] - 0.03) < 4.0 * found.numbers["sigma_lost_share"]
-
-
 @pytest.mark.parametrize(("grade", "move_s"), [("mpu", 0.4), ("adis", 2.0)])
 def test_healthy_logs_with_brisk_or_slow_moves_lose_nothing(grade, move_s):
     for seed in (5, 6):

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from diagnosed_session import nearest_pose, simulated
 from small_session import G
 from small_session import simulated as of_motion
-from trihedron import calibrate, diagnose, verify
+from trihedron import calibrate, diagnose
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import _folds, predict_held_out, tune_noise
 from trihedron.diagnose.session.starting_point import start_state
@@ -58,8 +58,6 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     assert diagnosis.to_dict()["figures"] == figures
     assert calibration_record(result.calibration, result.segments, result.recording)["figures"] == figures
     assert set(figures) == {"gravity_error_in_static_poses", "tilt_error_after_rotations"}
-    assert "one bias for the session" in figures["gravity_error_in_static_poses"]["definition"]
-    assert "bias refitted per pose" in figures["tilt_error_after_rotations"]["definition"]
     table = figures_table(result.calibration, {})
     assert table is not None
     assert table.head[1:3] == ("S and b, in sample", "cross-validated")
@@ -67,15 +65,6 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     for text, first in ((str(result), 2), (str(diagnosis), 1)):
         flat = " ".join(text.split())
         assert all(value in flat for row in table.rows for value in row[first:])
-
-
-def test_a_calibration_verified_on_its_own_session_shows_the_figures_that_it_published(healthy):
-    recording, gravity, result, _ = healthy
-    checked = verify(result.calibration, recording, gravity_m_s2=gravity)
-    rms = np.sqrt(np.mean(checked.verification.norm_error**2))
-    assert rms == pytest.approx(result.accelerometer.quality.rms, rel=1e-9)
-    # Directions of the poses come from the same means; the noise of a pose was measured with another accelerometer.
-    np.testing.assert_allclose(checked.verification.angle_deg, result.gyroscope.quality.angle_deg, rtol=1e-6)
 
 
 def test_the_held_out_figure_at_rest_is_that_of_the_saved_model_refitted_without_the_poses(healthy):
@@ -158,7 +147,7 @@ def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_poses_a
 def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
     scores = []
     for seed in range(4):
-        recording, truth = simulated(seed=seed + 20, grade="adis")
+        recording, truth = simulated(seed=seed + 20, n_poses=16, grade="adis")
         segments = segment_recording(recording)
         rng = np.random.default_rng(seed)
         scale = np.cbrt(abs(np.linalg.det(truth.gyroscope_S)))
@@ -266,11 +255,11 @@ def _drawn(n_poses: int, seed: int):
 
 
 def test_gravity_errors_of_a_joint_fit_have_the_degrees_of_freedom_that_moves_leave_them() -> None:
-    found = [calibrate(_drawn(12, k), **GRAVITY).accelerometer.quality for k in range(16)]
+    found = [calibrate(_drawn(12, k), **GRAVITY).accelerometer.quality for k in range(8)]
     chi2, dof = (sum(getattr(one, name) for one in found) for name in ("chi2", "dof"))
     # The poses alone would leave 3 each; χ² of all scatters by sqrt(2 dof), dof is a whole number of each.
-    assert dof > 16 * 5
-    assert abs(chi2 - dof) < 3.0 * np.sqrt(2.0 * dof) + 0.5 * np.sqrt(16.0)
+    assert dof > 8 * 5
+    assert abs(chi2 - dof) < 3.0 * np.sqrt(2.0 * dof) + 0.5 * np.sqrt(8.0)
     held = [one.held_out_rms / one.floor for one in found]
     assert np.median(held) < 1.6  # a twelfth pose is predicted by eleven and their moves
 

@@ -164,11 +164,7 @@ MEANINGS = {
     ("accelerometer", "x", "g"): "ax_g | accelerometerAccelerationX(G) | Beschl. X [g] | 加速度X(g) | X轴加速度（g）",
     ("accelerometer", "x", "mg"): "acc_x (mg)",
     ("accelerometer", "0", "m/s^2"): "accelerometer_m_s2[0]",
-    (
-        "accelerometer",
-        "x",
-        "m/s^2",
-    ): "Acceleration x (m/s^2) | ax [m/s²] | Acel X (m/s²) | a x [meters per second squared]",
+    ("accelerometer", "x", "m/s^2"): "Acceleration x (m/s^2) | Acel X (m/s²) | a x [meters per second squared]",
     ("accelerometer", "z", "m/s^2"): "a_RS_S_z [m s^-2]",
     ("gyroscope", "x", ""): "wx | gyro_x | gx_output | AngularVelocityX | GyX | girox | ωx",
     ("gyroscope", "y", ""): "Gyr_Y | vitesse_angulaire_y | prędkość kątowa Y",

@@ -132,8 +132,6 @@ def test_a_bias_has_one_sign_and_one_value_in_every_report():
     again = trihedron.diagnose(recording, calibration=result)
     given = next(one for one in again.parameters if (one.id, one.name) == ("accel-bias", "x"))
     assert given.model == pytest.approx(expected[0], abs=1e-9)
-    for one in (result, several, again):
-        assert "the reading without input (sign opposite to b)" in re.sub(r"\s+", " ", trihedron.report(one))
 
 
 @pytest.mark.parametrize("shift_deg_s", [0.0, 0.1])

@@ -115,7 +115,8 @@ readings += 1e-3 * rng.standard_normal((60_000, 3))
 out = [trihedron.integrate_rate(t, w)[[1500, -1]]]
 for length in (2, 3, 7, 8, 9, 16, 41, 200):
     out += _core.block_statistics(w[:9001], length)[:2]
-out += _core.allan_variance(readings, [1, 8, 512], _core.AllanKind.Overlapping)[:1]
+for kind in (_core.AllanKind.Overlapping, _core.AllanKind.Hadamard):
+    out += _core.allan_variance(readings, [1, 8, 512], kind)[:1]
 edges, anchors = np.array([[3, 700], [701, 1490]]), np.array([[-1.0, 8.0], [6.0, 20.0]])
 zero = np.full((2, 3), 0.01)
 noise = _core.RateNoise(np.full(3, 1e-4), 1e-4, 0.01)

@@ -94,7 +94,5 @@ def test_healthy_recordings_share_nothing_and_one_not_with_itself_alone():
     document = shared_diagnosis_report(red)
     assert document.level == "bad"
     assert "seed 12" in document.verdict.split("share")[0]
-    assert "NOT TO BE TRUSTED: The poses determine 4 parameters." in document.verdict
-    assert document.next_step.startswith("Leave out ")
     with pytest.raises(ValueError, match="two or more"):
         trihedron.diagnose_sessions([simulated("", 11, 14)[0]], gravity_m_s2=9.81)

@@ -15,27 +15,27 @@ DEG = 131.0
 
 
 @cache
-def session():
+def session(n_poses=24):
     """A recording with gyro readings about their static mean, its truth, and its poses."""
-    recording, truth = simulated(seed=4)
+    recording, truth = simulated(seed=4, n_poses=n_poses)
     poses = segment_recording(recording).poses
     still = np.concatenate([recording.gyroscope[p.start : p.stop] for p in poses]).mean(axis=0)
     return recording, truth, poses, recording.gyroscope - still
 
 
-def found_with(*, force=0.0, rate=0.0, scatter=0.0):
-    recording, truth, poses, _ = session()
+def found_with(n_poses=24, *, force=0.0, rate=0.0, scatter=0.0):
+    recording, truth, poses, _ = session(n_poses)
     recording = with_scatter(recording, poses, scatter) if scatter else recording
     changed = replace(recording, accelerometer=recording.accelerometer + force, gyroscope=recording.gyroscope + rate)
     return trihedron.diagnose(changed, gravity_m_s2=truth.gravity_m_s2)
 
 
 def test_a_gyro_that_creeps_after_rotations_is_said_so_though_its_bias_differs_from_pose_to_pose():
-    recording, _, _, turning = session()
+    recording, _, _, turning = session(18)
     creep, step, tau = np.zeros_like(turning), 1.0 / recording.rate_hz, 3.0
     for k in range(1, len(creep)):
         creep[k] = creep[k - 1] * (1.0 - step / tau) + turning[k] * step
-    found = found_with(rate=0.01 * creep, scatter=0.01 * DEG)
+    found = found_with(18, rate=0.01 * creep, scatter=0.01 * DEG)
     assert found.verdict == "unexplained"
     assert {one.id for one in found.effects} <= {"gyro-bias-repeatability"}
     (relation,) = found.relations
@@ -58,10 +58,10 @@ def test_a_scale_of_the_accelerometer_that_steps_is_no_bias_that_differs_from_po
 
 
 def test_a_gyro_scale_that_follows_an_unlogged_voltage_has_no_other_name():
-    recording, _, _, turning = session()
+    recording, _, _, turning = session(18)
     x, rng = recording.time_s / recording.time_s[-1], np.random.default_rng(2)
     course = sum(rng.normal() / k * np.cos(np.pi * k * x + rng.uniform(0.0, 6.0)) for k in range(1, 5))
-    found = found_with(rate=turning * (0.005 * course / np.abs(course).max())[:, None])
+    found = found_with(18, rate=turning * (0.005 * course / np.abs(course).max())[:, None])
     assert (found.verdict, found.effects) == ("unexplained", ())
     assert {one.domain for one in found.remaining if one.disagrees} >= {"moves"}
     assert found.relations[0].depends_on[0] == "w times cosine 1 of time"

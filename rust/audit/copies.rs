@@ -104,24 +104,3 @@ fn whole(rows: &[[f64; 3]], block: Range<usize>, apart: usize) -> Option<Range<u
     }
     (stop - first <= most).then_some(first..stop)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::copies;
-
-    #[test]
-    fn a_block_sent_twice_is_found_and_neither_held_readings_nor_a_periodic_motion() {
-        let reading = |i: u32| [1.3, 2.7, 3.1].map(|k| (f64::from(i * i) * k).sin());
-        let mut rows: Vec<[f64; 3]> = (0..500).map(reading).collect();
-        assert!(copies(&rows, 100, 4).is_empty());
-        for k in 0..20 {
-            rows[200 + k] = rows[170 + k];
-        }
-        let found: Vec<usize> = copies(&rows, 100, 4).into_iter().flatten().collect();
-        assert_eq!(found, (200..220).collect::<Vec<_>>());
-        let held: Vec<_> = (0..500).map(|i| reading(i / 4)).collect();
-        assert!(copies(&held, 100, 4).is_empty());
-        let periodic: Vec<_> = (0..500).map(|i| reading(i % 50)).collect();
-        assert!(copies(&periodic, 100, 4).is_empty());
-    }
-}

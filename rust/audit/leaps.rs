@@ -60,23 +60,3 @@ fn leap(window: &[[f64; 3]], row: usize, noise: &[f64; 3], least: f64) -> Option
     }
     is_far.then_some(out)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::leaps;
-
-    #[test]
-    fn a_single_reading_far_from_a_cubic_leaps_and_a_pulse_of_two_readings_does_not() {
-        let mut rows: Vec<[f64; 3]> = (0..100_u32)
-            .map(|i| [0.0, 1.0, 2.0].map(|k| (f64::from(i) / 30.0 + k).sin()))
-            .collect();
-        let noise = [1e-3; 3];
-        assert!(leaps(&rows, &noise, 8.0).is_empty());
-        rows[40][1] += 1.0;
-        rows[60][0] += 1.0;
-        rows[61][0] += 1.0;
-        let found = leaps(&rows, &noise, 8.0);
-        assert_eq!(found.iter().map(|one| one.row).collect::<Vec<_>>(), [40]);
-        assert!((found[0].away[1] - 1.0).abs() < 1e-3);
-    }
-}

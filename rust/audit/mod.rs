@@ -185,21 +185,3 @@ pub fn near(rows: &[[f64; 3]], axis: usize, value: f64, depth: f64) -> Near {
         at: parts.into_iter().flat_map(|p| p.at).collect(),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{SHARE, largest_steps};
-
-    #[test]
-    fn the_largest_step_skips_missing_readings_and_crosses_shares() {
-        let mut rows = vec![[0.0; 3]; 2 * SHARE];
-        rows[SHARE - 1] = [f64::NAN, 0.0, 0.0];
-        rows[SHARE - 2] = [-4.0, 0.0, 0.0];
-        rows[SHARE] = [3.0, 2.0, 0.0];
-        assert_eq!(
-            largest_steps(&rows).map(f64::to_bits),
-            [7.0, 2.0, 0.0].map(f64::to_bits)
-        );
-        assert!(largest_steps(&[]).iter().all(|step| *step == 0.0));
-    }
-}

@@ -1,9 +1,8 @@
 //! The solver on problems whose answer is known.
 
 use nalgebra::{DMatrix, DVector};
-use proptest::prelude::*;
 use trihedron::Result;
-use trihedron::gauss_newton::{Linear, Options, Solution, Stop, certainty, minimise};
+use trihedron::gauss_newton::{Options, Solution, Stop, minimise};
 
 #[allow(clippy::unnecessary_wraps)] // the solver's signature
 fn rosenbrock(x: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>)> {
@@ -57,28 +56,4 @@ fn a_direction_without_data_is_counted_not_invented() {
     assert!((solution.parameters[0] - solution.parameters[1] - 6.0).abs() < 1e-12);
     // Variance of the sum: one fifth.
     assert!((solution.certainty.covariance.sum() - 0.2).abs() < 1e-12);
-}
-
-#[test]
-fn fewer_rows_than_parameters_still_give_all_directions() {
-    let rows = DMatrix::from_row_slice(1, 3, &[1.0, 0.0, 0.0]);
-    let sure = certainty(&rows, 1e-9);
-    assert_eq!(sure.rank, 1);
-    assert_eq!(sure.singular_values.len(), 3);
-    assert_eq!(sure.directions.shape(), (3, 3));
-}
-
-proptest! {
-    #[test]
-    fn rows_are_compressed_to_their_normal_equations(
-        entries in prop::collection::vec(-1.0..1.0f64, 36), r in prop::collection::vec(-1.0..1.0f64, 12)
-    ) {
-        let jacobian = DMatrix::from_row_slice(12, 3, &entries);
-        let residuals = DVector::from_vec(r);
-        let gram = jacobian.transpose() * &jacobian;
-        let gradient = jacobian.transpose() * &residuals;
-        let rows = Linear::from_rows(residuals, jacobian);
-        prop_assert!((rows.r_factor.transpose() * &rows.r_factor - &gram).norm() < 1e-12);
-        prop_assert!((rows.r_factor.transpose() * &rows.rhs - &gradient).norm() < 1e-12);
-    }
 }

@@ -1,6 +1,5 @@
 //! Property and derivative tests of the kernels, one module per room.
 
-mod allan;
 mod ellipsoid;
 mod gauss_newton;
 mod made_session;
