@@ -105,7 +105,8 @@ def test_a_figure_is_drawn_where_it_is_asked_for():
 def test_verbs_and_classes_say_what_they_return_and_raise_and_their_examples_run(tmp_path, monkeypatch):
     """Examples name a recording and its calibration as a reader has them."""
     monkeypatch.chdir(tmp_path)
-    recording, result, _ = usual()
+    recording = trihedron.simulate("hand-session", 3)[0]
+    result = trihedron.calibrate(recording, latitude_deg=60.0)
     run = doctest.DocTestRunner()
     for name in trihedron.__all__:
         verb = getattr(trihedron, name)
