@@ -59,7 +59,8 @@ class FollowingHand:
 @pytest.fixture(scope="module")
 def led():
     """A hand that does what the guide says, heard only through the guide's view; the session grows pose by pose."""
-    hand = FollowingHand(scenario_by_name("hand-session"), 1, first_pose_s=7.5)
+    scenario = scenario_by_name("hand-session")
+    hand = FollowingHand(replace(scenario, clock=replace(scenario.clock, rate_hz=50.0)), 1, first_pose_s=7.5)
     state = {}
 
     def look():

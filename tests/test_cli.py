@@ -142,16 +142,6 @@ def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, sai
     assert said in rejected(capsys, *arguments)
 
 
-def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(session, tmp_path, capsys):
-    kept = tmp_path / "kept.json"
-    kept.write_text("precious")
-    for option in ("-o", "--json", "--report"):
-        assert "left alone" in rejected(capsys, "calibrate", session / "log.csv", option, kept)
-        assert kept.read_text() == "precious"
-    assert main(["calibrate", str(session / "log.csv"), "--gravity", G, "-o", str(kept), "--force"]) == 0
-    assert json.loads(kept.read_text())["format_version"] == 1
-
-
 def test_units_that_a_calibration_does_not_map_are_refused(session, tmp_path, capsys):
     other = tmp_path / "si.csv"
     recording = usual()[0]

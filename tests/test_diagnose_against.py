@@ -259,7 +259,8 @@ def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, c
 def test_gravity_is_that_of_the_scenario_unless_given():
     """A simulation at the pole, and a log of it: with standard gravity on one side scales would differ by 0.3 %."""
     at_the_pole = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=9, pose_s=2.0, move_s=1.0))
-    at_the_pole = replace(at_the_pole, environment=replace(at_the_pole.environment, gravity_m_s2=9.832))
+    clock, world = replace(at_the_pole.clock, rate_hz=50.0), replace(at_the_pole.environment, gravity_m_s2=9.832)
+    at_the_pole = replace(at_the_pole, clock=clock, environment=world)
     found = trihedron.diagnose(simulate(at_the_pole, 5)[0], against=at_the_pole)
     assert found.calibration.gravity_m_s2 == 9.832
     assert found.gravity_source == "that of the scenario"
