@@ -99,6 +99,10 @@ def test_a_bias_of_ten_thousand_times_the_noise_costs_no_digits():
     for m, variance in zip(clusters, curve.variance, strict=True):
         d = p[2 * m :] - 2 * p[m:-m] + p[: -2 * m]
         assert variance == pytest.approx(float(np.sum(d * d) / (2 * np.longdouble(m) ** 2 * len(d))), rel=1e-9)
+    # Nor where readings are missing.
+    x[::1000] = np.nan
+    variances = (allan_deviation(one, 100.0, clusters).variance for one in (x, x - 1e4))
+    assert next(variances) == pytest.approx(next(variances), rel=1e-9)
 
 
 def test_counts_are_read_in_their_own_type():

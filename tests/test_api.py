@@ -22,14 +22,6 @@ from trihedron.records import Finding, Severity
 SHOWN_ONLY = {"calibrate_references", "capture", "demo", "diagnose_sessions", "filter_noise", "fleet", "guide"}
 
 
-def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():
-    x = np.random.default_rng(1).normal(size=4096)
-    one, two = trihedron.allan_deviation(x, 100.0), trihedron.allan_deviation(np.c_[x, x], 100.0)
-    assert one.deviation.shape == one.lower.shape == one.edf.shape == one.tau_s.shape
-    assert two.deviation.shape == (*one.tau_s.shape, 2)
-    assert np.array_equal(two.deviation[:, 1], one.deviation)
-
-
 def with_sensor(result, **changes):
     return replace(result.calibration, accelerometer=replace(result.calibration.accelerometer, **changes))
 

@@ -39,7 +39,7 @@ TAKEN_OFF = {
 }
 
 
-def scenario(layout=1, n_poses=14):
+def scenario(layout=1, n_poses=18):
     return unit_of(hand_session(n_poses, layout=layout))
 
 

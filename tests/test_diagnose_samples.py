@@ -95,7 +95,7 @@ def test_codes_that_never_occur_are_named_where_noise_spans_many():
 
 
 def test_a_supply_that_both_sensors_follow_is_one_effect():
-    sagging = scenario_by_name("hand-session")
+    sagging = replace(scenario_by_name("hand-session"), motion=hand_session(15))
     for sensor in ("accelerometer", "gyroscope"):
         sagging = with_effect(sagging, "supply-sensitivity", sensor=sensor, sag_v=0.3, sag_tau_s=20.0)
     recording, truth = simulate(sagging, seed=3)

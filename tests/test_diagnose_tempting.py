@@ -77,7 +77,7 @@ def low_pass(values, dt_s, tau_s):
 
 @pytest.mark.parametrize(
     ("lag_s", "seed"),
-    [(20.0, 1), (-20.0, 2), *(pytest.param(*o, marks=pytest.mark.slow) for o in ((8.0, 3), (35.0, 4)))],
+    [(20.0, 1), *(pytest.param(*o, marks=pytest.mark.slow) for o in ((-20.0, 2), (8.0, 3), (35.0, 4)))],
 )
 def test_a_bias_follows_the_temperature_of_the_die_and_a_thermometer_beside_it_lags(lag_s, seed):
     recording, truth = simulate(session("mpu", seed), seed)
@@ -129,7 +129,7 @@ class Machine:
 
 def test_a_table_at_a_constant_rate_is_at_no_range_limit_though_moves_disagree():
     rng = np.random.default_rng(2)
-    first, *others = (attitude(up, rng.uniform(0.0, 6.28)) for up in directions(20, rng))
+    first, *others = (attitude(up, rng.uniform(0.0, 6.28)) for up in directions(14, rng))
     steps = [Step(4.0)] + [step for to in others for step in (Step(5.0, to=to, law="table"), Step(4.0))]
     motion, per = move(steps, first, Machine(), 100.0)
     force, rate, rate_hz, truth = read_out(motion, per, rng)
@@ -150,7 +150,7 @@ def test_a_gyro_whose_moves_are_all_beyond_its_range_is_not_extended():
 
 
 def test_large_effects_of_both_sensors_are_found_and_a_drift_is_no_temperature():
-    warming = replace(session(seed=2), environment=WARMING)
+    warming = replace(session(seed=2, n_poses=15), environment=WARMING)
     bent = with_effect(warming, "gyro-scale-nonlinearity", c3=(6e-3, 5e-3, 4e-3))
     found = diagnosed(with_effect(bent, "accel-bias-drift", amplitude=(0.28, 0.29, -0.37), tau_s=70.0))
     assert {one.id for one in found.effects} == {"gyro-scale-nonlinearity", "accel-bias-drift"}
@@ -187,7 +187,7 @@ def test_at_a_stated_latitude_the_vertical_part_of_earth_rate_is_no_force_on_the
 
 
 def test_a_gyro_that_does_not_read_the_earth_has_no_g_sensitivity_at_a_stated_latitude():
-    recording, truth = simulate(session("tactical"), 1)
+    recording, truth = simulate(session("tactical", n_poses=14), 1)
     found = trihedron.diagnose(recording.with_same_readings(latitude_deg=65.0), gravity_m_s2=truth.gravity_m_s2)
     assert [effect.id for effect in found.effects] == ["earth-rate"]
     assert "stated_vertical" in {p.name for p in found.effects[0].parameters}
