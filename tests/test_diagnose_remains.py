@@ -1,27 +1,17 @@
-"""What must not be absorbed, which of several explanations, supports that give, and pairs of mechanisms."""
+"""What must not be absorbed, which of several explanations, and pairs of mechanisms."""
 
 from dataclasses import replace
 
 import numpy as np
 import polars as pl
 import pytest
-from scipy.spatial.transform import Rotation
 
 import trihedron
 from diagnosed_session import simulated, unit_of, with_scatter
 from nuisance_trial.draw import G, draw
-from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.table import _error_of_mean
-from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
-from trihedron.diagnose.search import threshold
-from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.solve import tune_noise
-from trihedron.diagnose.session.starting_point import start_state
-from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
-
-NAMED = threshold(0.01)
 
 
 def test_a_bias_that_switches_follows_a_random_telegraph_signal():
@@ -111,50 +101,6 @@ def test_losses_in_most_moves_are_found_beside_each_other():
     lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
     # Two of them are lost where hardly anything turns.
     assert 0.8 * len(gone) <= lost.value <= len(gone)
-
-
-def session(lean_rad):
-    """Poses that lean by ``lean_rad`` within seconds of being set down."""
-    recording, truth = simulated(seed=1, grade="tactical")
-    rng = np.random.default_rng(4)
-    step_s, n = 1.0 / recording.rate_hz, recording.n_samples
-    turning, leant = np.zeros((n, 3)), [Rotation.identity()] * n
-    for part in truth.segments:
-        here = slice(part.start, part.stop)
-        fade = np.exp(-(recording.time_s[here] - recording.time_s[part.start]) / 2.0)[:, None]
-        direction = lean_rad * rng.normal(size=3) * (part.kind == "pose")
-        turning[here] = fade / 2.0 * direction
-        # As it leans the sensor is picked up: the rest of the session is rotated too.
-        before = leant[part.start - 1] if part.start else leant[0]
-        leant[here] = list(Rotation.from_rotvec(-np.cumsum(turning[here], axis=0) * step_s) * before)
-        leant[part.stop :] = [leant[part.stop - 1]] * (n - part.stop)
-    leaning = Rotation.concatenate(leant)
-    force, rate = truth.specific_force_m_s2.copy(), truth.angular_rate_rad_s.copy()
-    to_raw = np.linalg.inv(np.asarray(truth.accelerometer_S)), np.linalg.inv(np.asarray(truth.gyroscope_S))
-    log = replace(
-        recording, accelerometer=recording.accelerometer + (leaning.apply(force) - force) @ to_raw[0].T,
-        gyroscope=recording.gyroscope + (leaning.apply(rate) - rate + turning) @ to_raw[1].T,
-    )  # fmt: skip
-    segments = segment_recording(log)
-    calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
-    obs = observe(log, resegment(log, segments))
-    return Context(tune_noise(obs, start_state(obs, calibration), None))
-
-
-def test_poses_that_lean_are_taken_off_static_rates_and_moves():
-    context = session(0.006)
-    seen = context.obs.support_seen(context.fitted.state)
-    assert seen.score > NAMED
-    leaning = context.obs.on(seen, context.fitted.state.gyro_S)
-    before, after = (
-        {one.domain: one for one in judge_rows(fitted, 0.01)}
-        for fitted in (context.fitted, tune_noise(leaning, context.fitted.state, None))
-    )
-    assert before["static-gyro"].disagrees
-    for domain in ("static-gyro", "moves"):
-        assert not after[domain].disagrees
-        # 0.06 and 0.05 deg/s about the vertical, which gravity does not show; 0.055 and 0.02 deg.
-        assert after[domain].rms < {"static-gyro": 0.7, "moves": 0.5}[domain] * before[domain].rms
 
 
 def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():

@@ -102,9 +102,16 @@ def test_a_sensor_slower_than_its_log_and_a_frozen_channel_are_found_with_their_
     table = counts()
     columns = slice(1 + 3 * sensor, 4 + 3 * sensor)
     table[:, columns] = table[np.arange(len(table)) // times * times, columns]
-    repeated = finding(read(tmp_path, table), "repeated-rows")
+    recording = read(tmp_path, table)
+    repeated = finding(recording, "repeated-rows")
     assert repeated.numbers["fraction"] == pytest.approx(1.0 - 1.0 / times, abs=0.01)
     assert ("accelerometer", "gyro")[sensor] in repeated.seen
+    # A peak that is written again is no limit, and a limit that is met is met in every row.
+    assert "clipping" not in codes(recording)
+    limit = (3000.0, 4096.0)[sensor]
+    table[:, columns.start] = np.minimum(table[:, columns.start], limit)
+    clipped = finding(read(tmp_path, table), "clipping")
+    assert clipped.numbers["x_high_count"] == np.count_nonzero(table[:, columns.start] == limit)
     table, column = counts(), (1, 5)[sensor]
     table[1500:1600, column] = table[1500, column]
     stuck = finding(read(tmp_path, table), "stuck-values")
