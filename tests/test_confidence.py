@@ -1,7 +1,5 @@
 """Sessions of an independent generator (benches/confidence): within their bars, or marked, whatever the motion."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -13,8 +11,6 @@ from confidence.sensor import lower, read_out, recorded
 from confidence.sessions import directions, hand, leaning, table
 from trihedron import calibrate, diagnose
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, NO_WEIGHT
-from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
-from true_segments import segments_from_truth
 
 RATE_HZ, POSE_S, MOVE_S, N_POSES = 100.0, 5.0, 1.5, 18
 NOISE = 0.02
@@ -163,30 +159,6 @@ def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
     rms = np.sqrt(np.mean(np.square(scores)))
     # 27 numbers, correlated within a session: 1 +- 0.3.
     assert 0.55 < rms < 1.4
-
-
-def test_the_zero_of_a_session_is_that_of_its_middle():
-    # A bias that drifts by 60 mm/s² over the session: the first pose's is 30 mm/s² from that of the middle.
-    drift = 0.06
-    away = []
-    for seed in range(3):
-        recording, truth = simulate(
-            Scenario(
-                motion=hand_session(20, pose_s=2.0, first_pose_s=3.0),
-                accelerometer=Accelerometer(noise=NoiseTerms(N=(2e-3,) * 3)),
-                gyroscope=Gyroscope(noise=NoiseTerms(N=(2e-4,) * 3)),
-            ),
-            seed,
-        )
-        part = np.linspace(-0.5, 0.5, recording.n_samples)[:, np.newaxis]
-        drifting = replace(recording, accelerometer=recording.accelerometer + drift * part)
-        segments = segments_from_truth(drifting, truth)
-        found = calibrate(drifting, segments=segments, gravity_m_s2=truth.gravity_m_s2)
-        middle = np.mean([part[pose.start : pose.stop].mean() for pose in segments.poses])
-        # f = S a' + b, so that b is minus the bias.
-        away.append(found.accelerometer.b + drift * middle)
-    # A third of what the bias of the first pose is away.
-    assert np.sqrt(np.mean(np.square(away))) < drift / 2 / 3
 
 
 def test_zeros_that_wander_as_consumer_parts_do_are_no_physics():

@@ -14,8 +14,6 @@ from confidence.sessions import hand
 from trihedron import calibrate
 from trihedron.api.planning import POSE_SETS
 from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
-from trihedron.records import Recording
-from turns_alone import turned
 
 
 def calibrated(seed, **levels):
@@ -51,7 +49,9 @@ WEAKNESSES = {
     # Its scale was narrowed and its bias was not: the covariance had an eigenvalue of -3.6.
     "coarse gyro turned slowly": Weakness(0, {"bits": 12, "move_s": 15.0, "grade": "industrial"}, {"b_w": 4.0}),
     # The drift hides in the nine parameters of the poses, and S_f was off by up to 4.5, S_w by 7 standard errors.
-    "accelerometer whose bias drifts by milli g": Weakness(202, {"drift": "accelerometer"}, {"S_f": 3.5, "S_w": 4.0}),
+    "accelerometer whose bias drifts by milli g": Weakness(
+        202, {"drift": "accelerometer"}, {"S_f": 3.5, "S_w": 4.0, "b_f": 4.5}
+    ),
     # An axis that stands still reads its bias while another turns: b was off by a third of a step, by up to 96 errors.
     "bias inside a step": Weakness(
         300, AXIS_BY_AXIS | {"bits": 10, "tremor_deg_s": 0.0, "move_s": 2.5}, {"b_w": 4.5, "S_w": 4.5}
@@ -147,30 +147,9 @@ def test_one_turn_and_one_zero_turn_give_the_manuals_variance():
     pair = design_turns([90.0, -90.0], 2.0, 5.0, N)
     assert pair.scale_bias_first == pytest.approx(N * math.sqrt(2.0 / 2.0) / (math.pi / 2), rel=1e-12)
     assert pair.scale == pytest.approx(pair.scale_bias_first, rel=1e-12)
+    # Of all 17 s as one least-squares problem: three axes, 4 s each, beside the static 5 s.
+    assert pair.bias == pytest.approx(N / math.sqrt(17.0), rel=1e-12)
     assert pair.bias < pair.bias_bias_first
-
-
-def test_the_plan_is_what_the_calibration_says_of_itself():
-    rng, rate = np.random.default_rng(3), 200.0
-    pieces, turns, zeros, clock = [], [], [], 0
-    for axis in range(3):
-        for angle in (math.pi / 2, -math.pi / 2):
-            n, still = int(2.0 * rate), int(20.0 * rate)
-            zeros.append((clock, clock + still))
-            turns.append((clock + still, clock + still + n, axis, angle))
-            block = np.zeros((still + n, 3))
-            t = (np.arange(n) + 0.5) / n
-            block[still:, axis] = angle / 2.0 * 30 * t**2 * (1 - t) ** 2
-            pieces.append(block)
-            clock += still + n
-    gyro = np.vstack(pieces) + rng.normal(size=(clock, 3)) * N * math.sqrt(rate)
-    recording = Recording(np.arange(clock) / rate, None, gyro, rate)
-    *spans, axes, angles = zip(*turns, strict=True)
-    _, _, sigma_S, sigma_b = turned(recording, list(zip(*spans, strict=True)), zeros, angles, list(axes), 1.0, 1e-6)
-    design = design_turns([90.0, -90.0], 2.0, 120.0, N)
-    # The calibration measures N itself, from 240 blocks of half a second: to 3 %.
-    np.testing.assert_allclose(np.diag(sigma_S), design.scale, rtol=0.12)
-    np.testing.assert_allclose(sigma_b, design.bias, rtol=0.12)
 
 
 def test_what_poses_are_worth_is_what_least_squares_of_gravity_says():

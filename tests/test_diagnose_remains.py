@@ -84,25 +84,6 @@ def test_losses_in_quick_motion_are_found_and_counted_by_gravity(tmp_path, seed,
     assert lost.value == pytest.approx(answer["values"]["lost"][0], rel=0.1, abs=1.0), what
 
 
-def test_losses_in_most_moves_are_found_beside_each_other():
-    recording, truth = simulated(seed=2, n_poses=20, grade="tactical")
-    rng = np.random.default_rng(2)
-    moving = np.concatenate([np.arange(s.start + 20, s.stop - 20) for s in truth.segments if s.kind == "move"])
-    # Two losses within six samples of each other are a jolt as well.
-    places = rng.choice(moving[::13], 14, replace=False)
-    gone = np.concatenate([k + np.arange(rng.integers(1, 3)) for k in places])
-    kept = np.setdiff1d(np.arange(recording.n_samples), gone)
-    log = replace(
-        recording, accelerometer=recording.accelerometer[kept], gyroscope=recording.gyroscope[kept],
-        time_s=recording.time_s[: len(kept)],
-    )  # fmt: skip
-    found = trihedron.diagnose(log, gravity_m_s2=truth.gravity_m_s2)
-    assert [one.id for one in found.effects][:1] == ["dropped-samples"]
-    lost = next(p for p in found.effects[0].parameters if p.name == "samples_lost")
-    # Two of them are lost where hardly anything turns.
-    assert 0.8 * len(gone) <= lost.value <= len(gone)
-
-
 def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     plain = unit_of(hand_session(20, pose_s=4.0, layout=5), 7, is_wide=True)
     # Half of what the biases do is the scatter: without it in the noise, a drift does not remove half of their misfit.

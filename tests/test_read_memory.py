@@ -154,12 +154,6 @@ def test_mimu4444_one_of_eight_devices(real_data):
     assert recording.rate_hz == pytest.approx(62.5, rel=1e-3)
     assert recording.accelerometer_unit is AccelerationUnit.COUNTS
     assert np.linalg.norm(recording.accelerometer[:100].mean(axis=0)) == pytest.approx(2048, rel=0.1)
-    # The last 100 s are violent: the gyro leaves its range on every axis.
-    clipped = finding(recording, "clipping")
-    assert clipped.numbers["sample"] > 0.75 * recording.n_samples
-    assert {clipped.numbers[f"{axis}_high_value"] for axis in "xyz"} == {32767.0}
-    assert {clipped.numbers[f"{axis}_low_value"] for axis in "xyz"} == {-32768.0}
-    assert "gyro" in clipped.seen
 
 
 def test_cats_tag_has_temperature_and_an_unusual_gyro_unit(real_data):

@@ -268,7 +268,7 @@ def test_the_gyros_scale_by_rotating_gravity_is_exact_for_quick_turns_and_its_un
     w = np.column_stack([np.zeros_like(t), -rate, np.zeros_like(t)])
     assert turning_of(a, w, 100.0).scale == pytest.approx(1.0, abs=2e-3)
     z = []
-    for seed in range(4):
+    for seed in range(2):
         log, _ = trihedron.simulate("hand-session", seed)
         own = trihedron.calibrate(log, gravity_m_s2=9.80665).calibration.gyroscope.S
         found = turning_of(log.accelerometer, log.gyroscope, log.rate_hz)
