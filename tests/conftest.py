@@ -33,7 +33,7 @@ def few_simulations(monkeypatch):
 
 @pytest.fixture(scope="module")
 def without_corners():
-    """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_of_norms.py has them."""
+    """Corners of filters cost nine tenths of a spectrum's time; tests/test_channel_facts.py has them."""
     from trihedron.records.channel_facts import LowPass
 
     with pytest.MonkeyPatch.context() as patch:

@@ -105,13 +105,6 @@ def test_a_vector_that_is_not_the_earths_is_not_called_so():
     assert not effect.is_plausible(at_home, 0.5 * turning(here, 1.0), sigma)
 
 
-def test_a_vertical_part_that_is_not_seen_leaves_the_latitude_to_the_horizontal_one():
-    value = turning(np.radians(35.0), 2.0) + np.array([0.0, 0.0, 8e-4])
-    near = nearest_turning(value, np.diag(np.square([5e-6, 5e-6, 8e-4])))
-    assert abs(np.degrees(near.latitude)) == pytest.approx(35.0, abs=3.0 * np.degrees(near.latitude_std))
-    assert np.degrees(near.latitude_std) < 15.0
-
-
 # Effects of the package: other tests may have added their own.
 OURS = [effect for effect in catalogue() if type(effect).__module__.startswith("trihedron.")]
 

@@ -137,24 +137,6 @@ def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(optio
     assert false <= 1
 
 
-@pytest.mark.parametrize(("axes", "least"), [(4, 3), pytest.param(10, 8, marks=pytest.mark.slow)])
-def test_a_filter_shows_its_corner_and_white_noise_none(axes, least):
-    rng = np.random.default_rng(73)
-    inside = dense = 0
-    for _ in range(axes):
-        axis = of(rng, corner=15.0)
-        # The density is that below the corner: half of the mean squared difference is a quarter of it.
-        dense += axis.white.lower <= 1e-2 <= axis.white.upper < 1.2e-2
-        inside += axis.corner_hz is not None and axis.corner_hz.lower <= 15.0 <= axis.corner_hz.upper
-        plain = of(rng)
-        assert plain.corner_hz is None
-        # Nothing below Nyquist, as far as twenty poses show.
-        assert plain.corner_above_hz > 35.0
-    # Of 4 at 95 % three or more with probability 0.986, of 10 eight or more with 0.988.
-    assert inside >= least
-    assert dense >= least
-
-
 def test_a_line_is_neither_white_noise_nor_a_corner_nor_noise_of_its_octave():
     ratios, corners = [], []
     for seed in range(3):

@@ -10,7 +10,6 @@ import trihedron
 from hand_made_sessions import motion
 from test_read import HEADER, assert_same, codes, readings, text_module, write
 from trihedron.read import ReadError, read_recording
-from trihedron.read.devices import _devices
 from trihedron.read.names import clock_said, known_unit, parse_name
 from trihedron.records import Severity
 from trihedron.units import AccelerationUnit
@@ -282,9 +281,3 @@ def test_devices_side_by_side_are_identified_by_the_names_of_their_columns(tmp_p
     if devices[0] == "A" and form.startswith("{d}"):
         with pytest.raises(ReadError, match=r"identify 2 devices: A, B; .*--instance 'A'"):
             read_recording(log)
-
-
-def test_sensors_and_axes_before_an_underscore_are_no_devices():
-    assert not _devices(("t", "acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z"))
-    assert not _devices(("t", "acc1", "acc2", "acc3", "gyr1", "gyr2", "gyr3"))
-    assert not _devices(("t", "x_acc", "y_acc", "z_acc", "x_gyro", "y_gyro", "z_gyro"))

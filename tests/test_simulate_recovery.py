@@ -161,13 +161,3 @@ def test_resampling_is_exact_for_cubics_and_refuses_what_lies_outside():
     for few, at in ((signal, 1.7), (signal[:3], 0.0)):
         with pytest.raises(ValueError, match=r"\w"):
             _core.simulate_resample(few, -0.3, 0.1, np.array([at]))
-
-
-def test_a_converter_rounds_clips_skips_codes_and_sleeps_in_its_dead_band():
-    x = three([0.6, 1.1, 2.4, 2.6, 9.0, -9.0])
-    out = _core.simulate_convert(x, 0.5, -4.0, 4.0, 0.8, [0.0, 1.0, 0.0], 5)
-    # Code 5 (2.5) and code 0 are missing; 0.6 is asleep in channels 1 (at 0, whose code is missing) and 2 (at 1).
-    assert out[:2].tolist() == [[-0.5, 1.0, -0.5], [1.0] * 3]
-    assert out[2:, 0].tolist() == [2.0, 2.0, 4.0, -4.0]
-    with pytest.raises(ValueError, match=r"\w"):
-        _core.simulate_convert(x, 0.5, 5.0, 4.0, 0.8, [0.0, 1.0, 0.0], 5)
