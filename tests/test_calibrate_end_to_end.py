@@ -80,7 +80,6 @@ def test_a_frame_is_a_choice_of_axes_and_changes_no_norm(recording, result):
 def test_a_recording_without_gyro_is_calibrated_alone_and_without_accelerometer_refused(recording):
     alone = trihedron.calibrate(replace(recording, gyroscope=None), gravity_m_s2=9.80665)
     assert alone.gyroscope is None
-    assert "Gyroscope" not in str(alone)
     with pytest.raises(ValueError, match="gyro alone"):
         trihedron.calibrate(replace(recording, accelerometer=None), gravity_m_s2=9.80665)
 
@@ -102,7 +101,6 @@ def test_verification_expects_what_it_sees_on_another_session_but_for_a_move_bey
     assert verified.verification.moves_left_out == (4,)
     np.testing.assert_array_equal(verified.verification.moves, np.delete(judged.moves, 4))
     assert verified.verification.angle_rms_deg < 1.5 * judged.angle_rms_deg
-    assert "without move 5" in str(verified)
 
 
 def test_a_gyro_rate_from_pose_to_pose_is_judged_unless_an_effect_or_a_stated_drift_explains_it(result):
@@ -115,7 +113,6 @@ def test_a_gyro_rate_from_pose_to_pose_is_judged_unless_an_effect_or_a_stated_dr
     np.testing.assert_allclose(own.angle_deg, of_gyro.angle_deg, rtol=1e-6)
     assert own.norm_rms == pytest.approx(alone.accelerometer.quality.rms, rel=1e-9)
     assert of_gyro.static_rate_rms > 8.0 * of_gyro.static_rate_floor
-    assert "gyro rate in static poses" in str(alone).partition("cross-validated")[0]
     healthy = result.gyroscope.quality
     assert healthy.static_rate_rms < 1.5 * healthy.static_rate_floor
 
@@ -126,11 +123,9 @@ def test_a_gyro_rate_from_pose_to_pose_is_judged_unless_an_effect_or_a_stated_dr
     checked, (finding,) = judged(alone)
     # More than ten times what noise allows is not verified, whichever error it is, unless a limit accepts the gyro.
     assert not checked.is_passed
-    assert "NOT VERIFIED: The gyro rate in static poses" in " ".join(str(checked).split())
     checked, (finding,) = judged(alone, limit_deg=1.0)
     assert checked.is_passed
     assert finding.numbers["per_g_rad_s"] == pytest.approx(2.2e-3, rel=0.3)
-    assert "Doubtful: gyro rate in static poses" in str(checked)
     drift = Finding.of("gyro-bias-drift", "poses", change_rad_s=1e-2, axis=1, times=50.0)
     stated = replace(alone.calibration, findings=(*alone.findings, drift))
     for known in (trihedron.extend(alone), stated):
@@ -162,7 +157,6 @@ def test_a_check_predicts_the_error_bars_that_the_calibration_has(recording, res
     checked = trihedron.check(recording)
     assert checked.is_fit
     np.testing.assert_allclose(checked.calibration.accelerometer.sigma_b, result.accelerometer.sigma_b, rtol=0.05)
-    assert "Expected standard uncertainty" in str(checked)
 
 
 @pytest.mark.parametrize("fit", ["calibrate_joint", "calibrate_moves"])

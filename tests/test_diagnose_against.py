@@ -163,7 +163,6 @@ def test_a_zero_that_moved_since_the_calibration_is_a_number_and_no_drift():
     # One fixed pair: 4 sigma of its own uncertainty, which must be below 0.02 °/s to be of use.
     assert abs(z.difference - np.radians(0.31)) < 4.0 * z.std
     assert z.std < np.radians(0.02)
-    assert "gyro bias Z" in str(found)
     assert found.updated is not None
 
 
@@ -173,7 +172,6 @@ def test_an_effect_that_only_the_simulation_has_is_surplus():
     assert found.verdict == "missing-physics"
     assert [(e.side, e.id) for e in found.effects] == [("model", "accel-quadratic")]
     assert not any(p.significant for p in found.parameters)
-    assert "which the recording lacks" in " ".join(str(found).split())  # wherever its lines break
 
 
 def test_residuals_under_effects_that_both_have_keep_the_names_of_their_rows():

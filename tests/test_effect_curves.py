@@ -20,11 +20,9 @@ from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
 from trihedron.diagnose.residuals.effect_curves import Driver, _driven
 from trihedron.diagnose.session.solve import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.effects.catalogue import CATALOGUE, REASONS
 from trihedron.report.findings.page import effects_page
 from trihedron.report.findings.wording import places
-from trihedron.report.text import to_text
 
 G = 9.80665
 DEG = np.pi / 180.0
@@ -177,7 +175,6 @@ def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter(fie
     # The vector may as well point the other way, its coupling being reversed.
     true = np.degrees(np.arccos(field[2] / np.linalg.norm(field)))
     assert min(abs(angle.value - true), abs(180.0 - angle.value - true)) < 4.0 * angle.std
-    assert "fixed in the world frame" in to_text(diagnosis_report(result))
 
 
 def test_a_gyro_that_averages_over_many_samples_lags_and_has_no_other_effect():
@@ -207,7 +204,5 @@ def test_a_bias_that_remembers_the_last_turn_is_said_so_with_its_size():
     (relation,) = result.relations
     assert relation.depends_on == ("sign of the last rotation about y",)
     assert relation.share > 0.1  # one axis of three follows it
-    said = " ".join(to_text(diagnosis_report(result)).split())
-    assert "the misfit follows sign of the last rotation about Y." in said
     (size,) = (c for c in relation.coefficients if c.name.startswith("y"))
     assert abs(size.value - 0.03 * DEG) < 4.0 * size.std

@@ -183,13 +183,10 @@ def kalman(files, *words):
     return main(["kalman", str(files / "log.csv"), "--gravity", "9.80665", *map(str, words)])
 
 
-def test_the_report_shows_every_method_and_the_calibration_file_holds_the_truth(files, tmp_path, capsys):
+def test_the_calibration_file_of_the_command_holds_the_truth(files, tmp_path):
     out = tmp_path / "calibration.json"
     status = kalman(files, "--reference", files / "angles.csv", "--noise", files / "noise.json", "-o", out)
-    text = capsys.readouterr().out
     assert status == 0
-    for words in ("Kalman filter", "Least squares", "Generalised least squares", "Recursive least squares", "mean NIS"):
-        assert words in text
     sensor = trihedron.read_calibration(out).accelerometer
     # Twelve standard normal numbers: 5 σ is beyond all of them but once in 10⁵ runs.
     assert np.max(np.abs(sensor.S - S_TRUE) / sensor.sigma_S) < 5.0

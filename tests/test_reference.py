@@ -111,7 +111,6 @@ def test_commands_of_a_rate_table_are_enough():
 def test_a_log_of_a_gyro_alone_is_diagnosed_and_its_calibration_refused_in_one_sentence(table):
     result = trihedron.diagnose(table.log, reference=table.motion, gravity_m_s2=G)
     assert result.verdict == "consistent"
-    assert "Against the reference" in str(result)
     # What is judged is a rate: no velocity in °/s.
     assert [(d.domain, d.unit) for d in result.domains] == [("rate", "rad/s")]
     assert diagnosis_document(result)["reference"]["accelerometer"] is None
@@ -124,7 +123,6 @@ def test_a_log_without_poses_is_calibrated_by_its_reference_and_a_rates_own_cloc
     level = np.tile([0.0, 0.0, G], (n, 1)) + 0.01 * np.sin(np.arange(3.0 * n)).reshape(-1, 3)
     log = trihedron.Recording.from_arrays(table.log.time_s, level, table.log.gyroscope, gyroscope_unit="counts")
     result = trihedron.calibrate(log, reference=table.motion, gravity_m_s2=G)
-    assert "before calibration" not in trihedron.report(result)
     fast = replace(table.motion, time_s=table.motion.time_s * (1.0 + 3e-4))
     usual, stretched = result.reference, fit_reference(table.log, fast, G)
     assert stretched.clock_rate_ppm[0] - usual.clock_rate_ppm[0] == pytest.approx(300.0, abs=30.0)
@@ -273,7 +271,6 @@ def test_two_recordings_of_one_unit_share_the_scale_and_have_biases_of_their_own
     alone = np.array(found.gyroscope.sigmas()["sigma_S"])
     assert np.all(np.array(one.gyroscope.sigmas()["sigma_S"]) < 1.05 * alone)
     assert np.abs(z_of(one, posed)).max() < 4.5
-    assert "2 recordings beside references" in str(result)
 
 
 def test_an_attitude_that_the_gyro_itself_carried_is_not_independent(found):

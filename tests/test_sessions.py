@@ -114,8 +114,6 @@ def test_the_common_model_and_the_session_that_is_apart_are_found(four_sessions)
     zero_x = next(one for one in result.model.repeated if one.parameter.id == "gyro-bias")
     # 0.01 in one of four is a standard deviation of 0.005.
     assert zero_x.within.low < 0.005 < zero_x.within.high
-    assert "gyro bias" in str(result)
-    assert "session-3.csv" in str(result)
     labels = ["mon", "mon", "tue", "tue"]
     dated = trihedron.calibrate_sessions(four_sessions, by="date", labels=labels, gravity_m_s2=G)
     assert all(one.between is not None for one in dated.model.repeated)
@@ -297,7 +295,6 @@ def test_errors_within_a_wide_uncertainty_and_above_the_own_calibrations_are_no_
         codes = [one.code for one in verified.findings]
         assert "residual-above-noise" not in codes
         assert ("calibration-imprecise" in codes) == is_less_certain
-        assert ("Verified:" in str(verified)) != is_less_certain
 
 
 def test_a_calibration_that_leaves_its_own_poses_no_smaller_error_is_said_to_be_no_improvement(first):

@@ -68,7 +68,7 @@ def test_the_twin_of_a_real_recording_looks_like_it(real_data, which, gravity, a
     assert np.sqrt(np.mean(difference**2)) < 0.02 * np.sqrt(np.mean(truth.angular_rate_rad_s[moving] ** 2))
     shaken = ((recording.accelerometer - copy.accelerometer) @ accel.S.T)[moving]
     assert np.sqrt(np.mean(shaken**2)) < 0.02 * gravity
-    for name, factor in (("accelerometer", 1.6), ("gyroscope", 1.4)):
+    for name, factor in (("accelerometer", accel_factor), ("gyroscope", gyro_factor)):
         original, twin_of_it = getattr(recording, name), getattr(copy, name)
         ratio = spectrum(twin_of_it, poses) / spectrum(original, poses)
         for low, high in OCTAVES:
