@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from trihedron import _core
 from trihedron.channel_facts.pooled import ratio_of
@@ -99,17 +98,12 @@ def test_a_missing_value_has_no_place_and_no_quantile_lies_outside():
             quantile(rows[:, 0], outside)
 
 
-def of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, impacts=0, rate=RATE):
+def of(rng, poses=20, seconds=4.0, N=1e-2, step=0.0, scatter=0.0, impacts=0, rate=RATE):
     """Noise of one axis in poses, a second of handling between them."""
     parts, windows, at = [], [], 0
     for k in range(poses):
         n = int(rate * seconds * rng.uniform(0.7, 1.4))
-        x = N * np.sqrt(rate) * np.exp(0.5 * scatter * rng.standard_normal()) * rng.standard_normal(n + 200)
-        if corner:
-            # First order, density at zero kept; a recursion has the spectrum of an analog filter that is sampled.
-            decay = np.exp(-2 * np.pi * corner / rate)
-            x = lfilter([1 - decay], [1, -decay], x)
-        x = x[200:]
+        x = N * np.sqrt(rate) * np.exp(0.5 * scatter * rng.standard_normal()) * rng.standard_normal(n)
         if k < impacts:
             x[n // 2 : n // 2 + 5] += 40 * N * np.sqrt(rate)
         x = x + rng.uniform(-10, 10)

@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import math
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -23,9 +22,7 @@ from trihedron.records import Calibration, Recording, SensorCalibration
 from trihedron.records.noise import TermName
 from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate
-from trihedron.units import RateUnit
 from true_segments import codes
-from turns_alone import turned
 
 
 def calibrated(capsys, *arguments, status=0):
@@ -207,33 +204,6 @@ def test_the_manuals_example_is_recovered_within_its_error_bars_and_its_board_is
     assert np.all(np.abs(again.parameters - last.parameters) <= 0.05 * np.sqrt(np.diag(again.covariance)))
     left = [finding.seen for finding in result.findings if finding.code == "left-handed"]
     assert ["ccelerometer" in seen for seen in left] == [True]  # as stated; the gyro's triad agrees with it
-
-
-def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data):
-    windows = {"x": (2420, 2910), "y": (2565, 3120), "z": (2975, 3500)}
-    angles = {"x": 361.338, "y": 367.160, "z": 363.6703}
-    blocks, turns, zeros, start = [], [], [], 0
-    for axis, name in enumerate("xyz"):
-        block = np.genfromtxt(real_data / "ctu" / f"{name}_rotation.csv", delimiter=",", skip_header=1)
-        first, last = windows[name]
-        rough = block[first:last, axis].sum() / 100.0
-        zeros.append((start, start + 2000))
-        angle = math.copysign(math.radians(angles[name]), rough)
-        turns.append((start + first, start + last, axis, angle))
-        blocks.append(block)
-        start += len(block)
-    gyroscope = np.concatenate(blocks)
-    recording = Recording(np.arange(len(gyroscope)) / 100.0, None, gyroscope, 100.0, gyroscope_unit=RateUnit.DEG_S)
-    *spans, axes, known = zip(*turns, strict=True)
-    S, *_ = turned(recording, list(zip(*spans, strict=True)), zeros, known, list(axes), math.pi / 180.0)
-    # The readings are in deg/s already, so each scale is the ratio of the reference angle to the integrated one.
-    scale = np.diag(S) * 180.0 / math.pi
-    assert np.abs(scale - 1.0).max() < 0.02
-    for turn, zero in zip(turns, zeros, strict=True):
-        rest = gyroscope[zero[0] : zero[1]].mean(axis=0)
-        seen = (gyroscope[turn[0] : turn[1]] - rest).sum(axis=0) / 100.0
-        # Back through the calibration: the reference angle, within the drift of the bias over 5 s.
-        assert abs((S @ seen)[turn[2]] - turn[3]) < math.radians(0.5)
 
 
 N, RATE = 120_000, 100.0
