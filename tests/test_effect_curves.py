@@ -178,7 +178,7 @@ def test_a_field_in_the_room_is_unexplained_with_its_inclination_not_scatter(fie
 
 
 def test_a_gyro_that_averages_over_many_samples_lags_and_has_no_other_effect():
-    log, truth, _, _ = session(7, 22)
+    log, truth, _, _ = session(7, 14)
     n = round(0.08 * log.rate_hz)
     before = np.concatenate([np.repeat(log.gyroscope[:1], n - 1, axis=0), log.gyroscope])
     mean = np.apply_along_axis(np.convolve, 0, before, np.full(n, 1.0 / n), mode="valid")

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
 from scipy.optimize import least_squares
 
 import trihedron
@@ -154,18 +153,6 @@ def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
     np.testing.assert_allclose((fit.x - at) / sigma, 0.0, atol=0.02)
     np.testing.assert_allclose(np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac))) / sigma, 1.0, rtol=1e-3)
     assert "not-converged" not in [one.code for one in result.findings]
-
-
-def test_errors_are_as_large_as_stated():
-    nees = []
-    for seed in range(100, 200):
-        readings, start, pose, _ = session(seed)
-        result = calibrate_without_references(readings, NOISE, start_s=start, pose_s=pose, gravity_m_s2=GRAVITY)
-        error = np.concatenate([(result.accelerometer.S - S_NORM).ravel(), result.accelerometer.b - B_NORM])[LOWER]
-        nees.append(normalised_error_squared(error, result.accelerometer.covariance[np.ix_(LOWER, LOWER)]))
-    # 100 draws of chi-square with 9 degrees of freedom, two-sided 99.9 % limits of the sum.
-    low, high = stats.chi2.ppf([0.0005, 0.9995], 9 * len(nees))
-    assert low < np.sum(nees) < high
 
 
 @pytest.fixture(scope="module")

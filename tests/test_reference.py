@@ -211,18 +211,18 @@ def test_a_rate_in_degrees_called_radians_and_an_axis_that_never_turned_are_refu
 
 
 def test_a_reference_clock_that_jumps_is_refused_with_the_place():
-    trial = tracked(51, seconds=80)
-    late = trial.motion.time_s + np.where(trial.motion.time_s > 40.0, 0.5, 0.0)
+    trial = tracked(51, seconds=50)
+    late = trial.motion.time_s + np.where(trial.motion.time_s > 25.0, 0.5, 0.0)
     with pytest.raises(ValueError, match=r"clock jumps by \+0\.5\d* s between \d+ and \d+ s of the log"):
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
 def test_a_clock_that_jumps_for_some_seconds_leaves_a_deviating_interval_and_the_rest_its_answer():
-    trial = tracked(53, seconds=60)
+    trial = tracked(53, seconds=40)
     t = trial.motion.time_s
-    found = fit_reference(trial.log, replace(trial.motion, time_s=t + np.where(t > 55.0, 0.5, 0.0)), G)
+    found = fit_reference(trial.log, replace(trial.motion, time_s=t + np.where(t > 35.0, 0.5, 0.0)), G)
     (apart,) = (one for one in found.findings if one.code == "reference-apart")
-    assert " from 57 to 59 s" in apart.seen
+    assert " from 37 to 39 s" in apart.seen
     assert np.abs(z_of(found, trial)).max() < 4.5
 
 
