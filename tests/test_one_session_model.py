@@ -137,7 +137,7 @@ def test_the_joint_answer_leaves_at_rest_what_it_prints_and_no_more_than_poses_a
 def test_scatter_of_the_zeros_is_found_and_does_not_spoil_the_answer():
     scores = []
     for seed in range(3):
-        recording, truth = simulated(seed=seed + 20, grade="adis")
+        recording, truth = simulated(seed=seed + 20, n_poses=16, grade="adis")
         segments = segment_recording(recording)
         rng = np.random.default_rng(seed)
         scale = np.cbrt(abs(np.linalg.det(truth.gyroscope_S)))

@@ -140,7 +140,7 @@ def test_a_long_delay_is_a_delay_of_that_length():
 
 def test_a_strong_quadratic_of_a_gyro_is_no_cubic_as_well():
     """Columns of the readings, which contain the effect, gave a cubic of 8 σ beside it."""
-    effects = diagnosed("gyro-scale-nonlinearity", 3, c2=[0.0, 0.02, 0.0]).effects
+    effects = diagnosed("gyro-scale-nonlinearity", 3, 16, c2=[0.0, 0.02, 0.0]).effects
     found = next(one for one in effects if one.id == "gyro-scale-nonlinearity")
     sizes = {one.name: one for one in found.parameters}
     # The simulated suspension's series goes on: fitted to its own readings the quadratic is 0.0198.
@@ -150,7 +150,7 @@ def test_a_strong_quadratic_of_a_gyro_is_no_cubic_as_well():
 
 def test_a_gyro_with_another_scale_in_either_sense_is_no_parabola():
     """Fitted by a quadratic and a cubic its S was 7 σ from the truth, and moves disagreed."""
-    effects = diagnosed("gyro-scale-nonlinearity", 3, asymmetry=[3e-3, 0.0, -3e-3]).effects
+    effects = diagnosed("gyro-scale-nonlinearity", 3, 16, asymmetry=[3e-3, 0.0, -3e-3]).effects
     assert effects[0].id == "gyro-scale-nonlinearity"
     # Asymmetries of 0.3 %, and a σ that resolves a tenth of them.
     for one, true in zip(effects[0].parameters, (3e-3, 0.0, -3e-3), strict=True):

@@ -66,7 +66,7 @@ def sessions(*strengths, unit=1):
     made = []
     for k, g in enumerate(strengths):
         size = {"matrix": [[0.0, g, 0.0], [0.0, 0.0, g], [-g, 0.0, 0.0]]} if g else {}
-        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 14, unit=unit, **size)[0])
+        made.append(simulated("gyro-g-sensitivity" if g else "", 11 + k, 12, unit=unit, **size)[0])
     return trihedron.diagnose_sessions(made, gravity_m_s2=9.81)
 
 
