@@ -15,7 +15,7 @@ from trihedron.simulate.effects import with_effect
 
 
 def test_a_bias_that_switches_follows_a_random_telegraph_signal():
-    recording, truth = simulated(seed=1)
+    recording, truth = simulated(seed=1, n_poses=18)
     rng, n = np.random.default_rng(1), recording.n_samples
     bias = 0.0003 * (-1.0) ** np.searchsorted(np.sort(rng.integers(0, n, 20)), np.arange(n), side="right")
     rates = recording.gyroscope + bias[:, None] / np.radians(1.0 / 131.0) * [0.0, 1.0, 0.0]

@@ -142,7 +142,7 @@ def test_a_table_at_a_constant_rate_is_at_no_range_limit_though_moves_disagree()
 
 def test_a_gyro_whose_moves_are_all_beyond_its_range_is_not_extended():
     result = trihedron.calibrate(
-        simulate(with_effect(session(), "gyro-saturation", limit=0.8), 1)[0], gravity_m_s2=9.80665
+        simulate(with_effect(session(n_poses=14), "gyro-saturation", limit=0.8), 1)[0], gravity_m_s2=9.80665
     )
     known = trihedron.extend(result).calibration
     assert not known.is_trustworthy
@@ -157,7 +157,7 @@ def test_large_effects_of_both_sensors_are_found_and_a_drift_is_no_temperature()
 
 
 def test_a_bias_that_follows_the_rate_of_temperature_on_each_axis_by_a_factor_of_its_own_is_no_drift():
-    made, truth = simulate(session(), 1)
+    made, truth = simulate(session(n_poses=15), 1)
     cycle = 28.0 + 4.0 * np.sin(2.0 * np.pi * made.time_s / 90.0)
     bias = np.outer(cycle - 28.0, (2e-4, -1e-4, 3e-4)) + np.outer(np.gradient(cycle, made.time_s), (-0.02, 0.015, 0.02))
     rate = made.gyroscope + np.round(np.linalg.solve(truth.gyroscope_S, bias.T).T)
@@ -167,7 +167,7 @@ def test_a_bias_that_follows_the_rate_of_temperature_on_each_axis_by_a_factor_of
 
 def test_the_earth_is_no_force_on_the_gyro_where_clipped_moves_break_the_chain_of_headings():
     # Its vertical part along gravity is an isotropic g-sensitivity; its horizontal part needs headings.
-    turning = with_effect(session("tactical"), "earth-rate", latitude_deg=55.0, heading_deg=40.0)
+    turning = with_effect(session("tactical", n_poses=16), "earth-rate", latitude_deg=55.0, heading_deg=40.0)
     found = {one.id for one in diagnosed(with_effect(turning, "gyro-saturation", limit=2.2)).effects}
     assert "earth-rate" in found
     assert "gyro-g-sensitivity" not in found
