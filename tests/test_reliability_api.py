@@ -172,9 +172,9 @@ def test_a_result_is_plain_types_a_frame_a_figure_and_a_piece_of_html(results, n
     for twin in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
         assert twin.to_dict() == plain
     assert isinstance(one.to_dataframe(), pl.DataFrame)
-    figure = one.plot()
-    assert isinstance(figure, Figure)
-    assert name != "calibrate" or figure._repr_png_().startswith(b"\x89PNG")
+    # Poses without their recording have no figure.
+    assert name == "segment" or isinstance(one.plot(), Figure)
+    assert name != "calibrate" or one.plot()._repr_png_().startswith(b"\x89PNG")
     page = one._repr_html_()
     # A notebook holds many: small, no picture inside, nothing that runs.
     assert len(page) < 8000

@@ -1,9 +1,11 @@
 """Calls from Python: errors and findings name parameters of functions in place of command-line flags."""
 
 import functools
+import inspect
 import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
+from difflib import get_close_matches
 from functools import cache
 from typing import Any, TypeVar
 
@@ -82,10 +84,15 @@ def _has_findings(record: Any) -> bool:
 
 
 def asked_in_python(verb: Verb) -> Verb:
-    """The verb with its error messages and findings in terms of Python parameters."""
+    """The verb with its error messages and findings in terms of Python parameters; a wrong keyword gets a hint."""
+    known = inspect.signature(verb).parameters
 
     @functools.wraps(verb)
     def ask(*args: Any, **kwargs: Any) -> Any:
+        wrong = next((name for name in kwargs if name not in known), "")
+        near = [name for name in known if wrong and name.startswith(wrong)] or get_close_matches(wrong, known, 1)
+        if near and not any(one.kind is one.VAR_KEYWORD for one in known.values()):
+            raise TypeError(f"{verb.__name__}: there is no {wrong}; is {near[0]} meant?")
         try:
             return result_in_python(verb(*args, **kwargs))
         except ValueError as error:
