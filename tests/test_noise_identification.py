@@ -8,12 +8,14 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+import trihedron
 from noise_coverage import in_time
 from trihedron.estimate.noise.binned import binned
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.slow_changes import slow_changes
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.files.noise import noise_figures
+from trihedron.records import Recording
 from trihedron.records.finding import Severity
 from trihedron.records.noise import TermName
 from trihedron.report.noise import noise_report
@@ -382,3 +384,19 @@ def test_a_hum_of_varying_frequency_is_no_low_pass():
     x = 0.1 * rng.normal(size=180_000) + 0.2 * np.sin(2.0 * np.pi * np.cumsum(31.0 + wander) * 0.01)
     (axis,) = identify_noise(x[:, None], 100.0).axes
     assert "spectrum-low-pass" not in {finding.code for finding in axis.findings}
+
+
+def test_lost_samples_and_repeated_rows_of_a_static_log_are_each_stated_once_and_leave_it_usable():
+    rng = np.random.default_rng(6)
+    x = 0.01 * rng.normal(size=(60_000, 6)) + [0.0, 0.0, 9.81, 0.0, 0.0, 0.0]
+    t = 0.01 * np.arange(60_000)
+    kept = rng.random(60_000) > 0.1
+    lost = trihedron.allan(Recording.from_arrays(t[kept], x[kept, :3], x[kept, 3:]))
+    assert [(f.code, f.severity.value) for f in lost.findings if f.code == "time-gap"] == [("time-gap", "note")]
+    assert lost.is_trustworthy
+    assert all(axis.terms["N"].lower < 1e-3 < axis.terms["N"].upper for axis in lost.axes)
+    held = np.repeat(x[::2], 2, axis=0)
+    twice = trihedron.allan(Recording.from_arrays(t, held[:, :3], held[:, 3:]))
+    assert [f.code for f in twice.findings].count("repeated-rows") == 1
+    # A reading in two rows: half as many of them per second, each for as long as two.
+    assert all(axis.terms["N"].lower < math.sqrt(2.0) * 1e-3 < axis.terms["N"].upper for axis in twice.axes)

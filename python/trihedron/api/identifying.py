@@ -89,7 +89,25 @@ def allan(
         source=recording.source,
     )
     # Findings about the log come before those about its noise.
-    return replace(found, findings=(*recording.findings, *doubts, *found.findings))
+    return replace(found, findings=(*_beside_noise(recording.findings, found.findings), *doubts, *found.findings))
+
+
+def _beside_noise(of_log: Sequence[Finding], of_noise: Sequence[Finding]) -> Iterator[Finding]:
+    """Findings of a log that concern its noise: lost samples do not bias the terms, and the repetition of whole rows is
+    stated once."""
+    is_repeated = any(finding.code == "repeated-rows" for finding in of_noise)
+    for one in of_log:
+        if one.code == "time-gap":
+            yield Finding.of(
+                "time-gap",
+                "static",
+                count=int(one.numbers["count"]),
+                lost_samples=int(one.numbers["lost_samples"]),
+                fraction=one.numbers["fraction"],
+                longest_s=one.numbers["longest_s"],
+            )
+        elif one.code != "repeated-rows" or not is_repeated:
+            yield one
 
 
 def _in_si(recording: Recording, known: Calibration) -> Recording:

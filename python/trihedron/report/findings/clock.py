@@ -20,6 +20,11 @@ _TIMESTAMPS = {
         "{is_mended:?|With samples timestamped in batches, read with --columns time=none and --rate.}",
         or_severity=NOTE,
     ),
+    ("time-gap", "static", NOTE): Words(
+        "{count:# gap}, about {lost_samples:# sample} lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s.",
+        "Lost packets, a full buffer, or a pause of the logger.",
+        "The noise terms allow for what is missing: nothing needs to be done.",
+    ),
     ("time-gap", "", WARNING): Words(
         "{count:# gap}, about {lost_samples:# sample} lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s. "
         "Where: {worst:each; }{has_more:?; and others|}.",
