@@ -40,6 +40,8 @@ SETTINGS = {
     **{f"g-sensitivity of {d:g} °/s/g": {"g_sensitivity": np.radians(d) / G} for d in (0.02, 0.1, 0.3)},
     **{f"lost {100 * p:g} %, timestamps true": {"lost": p} for p in (0.001, 0.03)},
     **{f"lost {100 * p:g} %, timestamps remade": {"lost": p, "is_remade": True} for p in (0.001, 0.03)},
+    # A radio link that drops 50 to 400 ms at a time.
+    **{f"lost {100 * p:g} % in bursts": {"lost": p, "burst": (5, 40)} for p in (0.1, 0.3)},
     # Bias repeatability from pose to pose [°/s, mm/s²].
     "scattered biases": {"n_poses": 24, "scatter": (0.05, 3.0)},
 }
@@ -56,7 +58,7 @@ def answer(make, options, seed):
     """Calibration of one session through the public front, and its truth in the same frame."""
     options = dict(options)
     lost, is_remade = options.pop("lost", 0.0), options.pop("is_remade", False)
-    scatter = options.pop("scatter", None)
+    burst, scatter = options.pop("burst", (1, 2)), options.pop("scatter", None)
     f, w, rate, truth, motion = make(seed, **options)
     t = getattr(motion, "time_s", np.arange(len(f)) / rate)
     if scatter:
@@ -64,7 +66,10 @@ def answer(make, options, seed):
         w = scattered(w, truth.S_w, t, motion.rests, np.radians(scatter[0]), rng)
         f = scattered(f, truth.S_f, t, motion.rests, 1e-3 * scatter[1], rng)
     if lost:
-        kept = np.random.default_rng([14, seed]).random(len(t)) >= lost
+        rng, kept = np.random.default_rng([14, seed]), np.ones(len(t), dtype=bool)
+        while kept.mean() > 1.0 - lost:
+            start = rng.integers(len(t))
+            kept[start : start + rng.integers(*burst)] = False
         f, w, t = f[kept], w[kept], t[kept]
         if is_remade:
             t = np.arange(len(f)) / rate
