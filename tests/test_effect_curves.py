@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from catalogues import effects_page
 from scipy.spatial.transform import Rotation
 
 from diagnosed_session import diagnosed, nearest_pose, simulated
@@ -21,7 +22,6 @@ from trihedron.diagnose.residuals.effect_curves import Driver, _driven
 from trihedron.diagnose.session.solve import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.report.effects.catalogue import CATALOGUE, REASONS
-from trihedron.report.findings.page import effects_page
 from trihedron.report.findings.wording import places
 
 G = 9.80665

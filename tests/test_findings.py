@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from catalogues import page
 
 from test_architecture import PACKAGE, no_search_for_garbage, nodes  # noqa: F401
 from trihedron.records import Finding, Severity
 from trihedron.report.effects.catalogue import CATALOGUE as EFFECTS
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
-from trihedron.report.findings.page import page
 from trihedron.report.findings.phrases import PHRASES
 from trihedron.report.findings.wording import filled, places
 

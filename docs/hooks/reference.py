@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from base64 import b64decode
 from importlib.resources import files
 from pathlib import Path
@@ -14,8 +15,11 @@ import typer
 import trihedron
 from trihedron.cli import build_app
 from trihedron.cli.help import described
-from trihedron.report.findings.page import effects_page as effects
-from trihedron.report.findings.page import page as findings
+
+# Scripts of the site are run by their path.
+sys.path.insert(0, str(Path(__file__).parent))
+from catalogues import effects_page as effects
+from catalogues import page as findings
 
 
 def commands() -> str:

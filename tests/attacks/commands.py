@@ -21,7 +21,7 @@ from trihedron.cli import COMMANDS, build_app, main
 
 HEAVY = {"demo", "diagnose", "fleet"}
 RARE = {"demo", "diagnose"}
-NEVER = {"--serve", "--guide", "--link", "--help", "--version", "--bell"}
+NEVER = {"--serve", "--guide", "--link", "--help", "--version"}
 WORDS = ["", "x", "nan", "inf", "-1", "0", "1", "1e300", "1e-300", "9" * 400, "\x1b[31m", "é", "0.5", "100", "--", "-"]
 SPECIAL = ["missing", "/dev/null", "/dev/zero", "/dev/full", ".", "loop", "fifo", "a\x1b[2Jb", "n" * 300, "sub/x", "-"]
 BY_OPTION = {

@@ -34,7 +34,6 @@ OPTIONS = {
     "guide": "Lead through a calibration on a live screen.",
     "accuracy": ("TEXT", 'Of the guide: "accel 0.05 %, gyro 0.1 %".'),
     "calibration": ("FILE", "Of the guide: calibration to write at the end."),
-    "bell": "Of the guide: ring when a pose is taken.",
     "list_them": typer.Option("--list", help="List the protocols and stop."),
 }
 
@@ -54,7 +53,6 @@ def capture(
     guide: bool = False,
     accuracy: str = ACCURACY,
     calibration: Path | None = None,
-    bell: bool = False,
     list_them: bool = False,
     force: bool = False,
 ) -> None:
@@ -84,7 +82,7 @@ def capture(
     from trihedron.cli.run import note_log
 
     with stopped_by(recorder, signal.SIGINT, signal.SIGTERM), full_disk_is_status_2():
-        made = run_guided(recorder, output, accuracy, place.gravity_m_s2, bell=bell, seconds=seconds)
+        made = run_guided(recorder, output, accuracy, place.gravity_m_s2, seconds=seconds)
     conclude(recorder, output, recorder.count.saved, is_ended_well=made.is_done)
     note_log(LogSource(log=output))
     finish(read(output), made.cut_s, place, calibration, force=force)

@@ -29,7 +29,6 @@ Show = Callable[["GuideView"], None]
 
 OPTIONS = {
     "accuracy": ("TEXT", 'When to stop: "accel 0.05 %, gyro 0.1 %".'),
-    "every": "Print the screen after every pose, not only the last.",
     "output": ("FILE", "Calibration to write.", "-o"),
 }
 
@@ -39,7 +38,6 @@ def guide(
     source: LogSource,
     place: GravitySource,
     accuracy: str = ACCURACY,
-    every: bool = False,
     output: Path | None = None,
     force: bool = False,
 ) -> None:
@@ -54,8 +52,6 @@ def guide(
 
     def notify(view: GuideView) -> None:
         put(_line(view) + "\n")
-        if every:
-            put(as_text(view, *_size()) + "\n")
 
     view, used, cut_s = replay(source.read(), wanted, gravity_m_s2=place.gravity_m_s2, on_pose=notify)
     put(as_text(view, *_size()) + "\n")
@@ -120,7 +116,6 @@ def run_guided(
     accuracy: str,
     gravity_m_s2: float,
     *,
-    bell: bool,
     seconds: float | None,
 ) -> Any:
     """Capture with the guide; returns the guide, which has the start of the verification."""
@@ -139,7 +134,7 @@ def run_guided(
     made = Guide(wanted, look)
     columns: list[int] = []
     started = time.monotonic()
-    with _Shown(recorder, started, bell=bell) as show:
+    with _Shown(recorder, started) as show:
         for block in recorder:
             if not columns:
                 columns = sensor_columns(block.columns)
@@ -152,8 +147,8 @@ def run_guided(
 class _Shown:
     """Display of the guide: a screen on a terminal, a line per change elsewhere."""
 
-    def __init__(self, recorder: Recorder, started: float, *, bell: bool) -> None:
-        self._recorder, self._started, self._bell = recorder, started, bell
+    def __init__(self, recorder: Recorder, started: float) -> None:
+        self._recorder, self._started = recorder, started
         self._live: Any = None
         self._events, self._drawn_s, self._said = 0, 0.0, ""
 
@@ -173,8 +168,6 @@ class _Shown:
     def _show(self, view: GuideView) -> None:
         rings = view.n_events > self._events
         self._events = view.n_events
-        if rings and self._bell:
-            sys.stderr.write("\a")
         now = time.monotonic()
         if now - self._drawn_s < 0.1 and not rings:
             return

@@ -20,7 +20,7 @@ _OF_THE_LOG = (
     *("accel", "gyro", "columns", "rate", "accel_unit", "gyro_unit", "time_unit", "topic", "instance"),
     *("gyro_lsb", "accel_lsb", "stream", "exclude", "keep_events"),
 )
-_OF_OUTPUT = ("output", "json", "report", "full", "force", "csv", "plot", "improved", "truth", "every")
+_OF_OUTPUT = ("output", "json", "report", "full", "force", "csv", "plot", "improved", "truth")
 OPTION_GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
     ("The log", frozenset(_OF_THE_LOG)),
     ("Gravity", frozenset({"gravity", "latitude", "height"})),
