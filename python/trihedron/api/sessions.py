@@ -52,11 +52,10 @@ def calibrate_sessions(
     ----------
     recordings : sequence of Recording, CalibrationResult, or what trihedron.read takes
         Two or more, in their order in time; each is calibrated by :func:`calibrate` where it is not yet.
-    by : "session", "date", "device" or "temperature"
-        Groups of sessions: every recording alone, those of one day, those of one device; or polynomials of temperature
-        through all of them.
+    by : "session", "date" or "temperature"
+        Groups of sessions: every recording alone, those of one day; or polynomials of temperature through all of them.
     labels : sequence of str, optional
-        One word per recording, instead of its date or device.
+        One word per recording, instead of its date.
     gravity_m_s2 or latitude_deg, height_m : float
         As for :func:`calibrate`.
     frame : "lower" or "symmetric"
@@ -119,9 +118,8 @@ def calibrate_sessions(
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
     of_place = (one for one in results[0].findings if one.code == "gravity-defaulted")
-    findings = (*of_place, *_doubts(results, sessions), *model.findings)
-    if by != "device":
-        findings = (*several_devices(sessions, model.changes, "calibrated"), *findings)
+    several = several_devices(sessions, model.changes, "calibrated")
+    findings = (*several, *of_place, *_doubts(results, sessions), *model.findings)
     model = replace(model, calibration=replace(model.calibration, findings=findings), findings=findings)
     return SessionsResult(model, tuple(results))
 
@@ -215,8 +213,4 @@ def _label(recording: Recording, by: By) -> str:
                 "one word for each recording."
             )
         return datetime.fromtimestamp(recording.start_epoch_s, tz=timezone.utc).date().isoformat()
-    if by == "device":
-        # Usually one folder per device; archives of several name the device after a comma.
-        _name, comma, device = recording.source.rpartition(", ")
-        return device if comma and device.startswith("device ") else Path(recording.source).parent.name
     return recording.source

@@ -37,14 +37,10 @@ def combine(
     first = in_frame(reference, "lower")
     anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
     plain = [replace(session, group=session.name) for session in sessions]
-    grouped = sessions if by in ("date", "device") else plain
+    grouped = sessions if by == "date" else plain
     repeated = repeated_parameters(grouped)
     thermal = thermal_model(sessions) if by == "temperature" else None
-    if by == "device":
-        units = [[s for s in sessions if s.group == name] for name in dict.fromkeys(s.group for s in sessions)]
-    else:
-        units = [] if by == "temperature" else [list(sessions)]
-    changes = changes_among(units, alpha=alpha)
+    changes = changes_among([] if by == "temperature" else [list(sessions)], alpha=alpha)
     calibration = _common(grouped, repeated, thermal, first, anchor)
     model = SessionsModel(by, tuple(sessions), repeated, changes, thermal, calibration, left_out)
     findings = findings_about(model)
@@ -154,11 +150,11 @@ def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
         Finding.of("session-left-out", name=name, why=words("because", sentence=why), path=as_arguments(path))
         for name, (path, why) in zip(names, model.left_out, strict=True)
     ]
-    n = len({session.group for session in model.sessions}) if model.by in ("date", "device") else len(model.sessions)
+    n = len({session.group for session in model.sessions}) if model.by == "date" else len(model.sessions)
     if n < FEW and model.thermal is None:
-        what = {"date": "days", "device": "devices"}.get(model.by, "recordings")
+        what = "days" if model.by == "date" else "recordings"
         out.append(Finding.of("few-sessions", n_groups=n, kind=what, wanted=FEW))
-    out += [_changed(change, model) for change in model.changes if change.significant]
+    out += [_changed(change) for change in model.changes if change.significant]
     temperatures = [s.temperature_degc for s in model.sessions if math.isfinite(s.temperature_degc)]
     if model.thermal is None and len(temperatures) > 1 and np.ptp(temperatures) > WIDE_RANGE_DEGC:
         low, high = min(temperatures), max(temperatures)
@@ -166,7 +162,7 @@ def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
     return tuple(out)
 
 
-def _changed(change: Change, model: SessionsModel) -> Finding:
+def _changed(change: Change) -> Finding:
     kind = change.id if change.id.endswith("common-scale") else change.id.rsplit("-", 1)[-1]
     is_other = kind == change.id and max(map(abs, change.size)) > OTHER_UNIT
     case = f"{kind}-{change.kind}"
@@ -176,8 +172,6 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
         severity=Severity.SERIOUS if is_other else Severity.WARNING,
         is_other=is_other,
         parameter=change.id,
-        device=change.group,
-        is_of_device=model.by == "device",
         amount=amount_of(change),
         where=change.where,
         p_adjusted=change.p_adjusted,

@@ -40,11 +40,8 @@ OPTIONS = {
     "gyro_nominal": ("X", "Nominal rad/s per gyro unit, where counts and few moves do not determine it."),
     "reference": ("MOTION", "Known motion beside the log: attitude, rate, pose or a log; one for each log."),
     "extended": "Diagnose the log too and store the accepted effects, which `trihedron apply` then compensates.",
-    "by": (
-        "HOW",
-        "Several logs: by session (each for itself), date, device (every device of an archive), or temperature.",
-    ),
-    "labels": ("LIST", "Several logs: day or device of each, with commas between."),
+    "by": ("HOW", "Several logs: by session (each for itself), date, or temperature."),
+    "labels": ("LIST", "Several logs: the day of each, with commas between."),
 }
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.options import GravitySource, LogSource, LogsSource, one_of, progress
+from trihedron.cli.options import GravitySource, LogsSource, one_of, progress
 from trihedron.cli.output import FullResults
 
 if TYPE_CHECKING:
-    from trihedron.records import Recording
+    pass
 
 FIRST_SCREEN = 2
 
@@ -64,7 +62,7 @@ def calibrate_many(
     results: FullResults,
 ) -> None:
     """Calibrate every log; print common parameters and their repeatability."""
-    how = one_of("--by", by or "session", ("session", "date", "device", "temperature"))
+    how = one_of("--by", by or "session", ("session", "date", "temperature"))
     from trihedron.api import sessions
     from trihedron.report.machine import sessions_record
     from trihedron.report.sessions import sessions_report
@@ -73,11 +71,8 @@ def calibrate_many(
     given = sources.each()
     with progress("calibrating") as notify:
         # An unreadable log stops the command, unlike a recording that cannot be calibrated.
-        recordings = list(_recordings(given, how))
-        if words is not None and len(words) == len(given) < len(recordings):
-            raise typer.BadParameter("--labels name logs; the devices of an archive have their own names")
         result = sessions.calibrate_sessions(
-            recordings,
+            [source.read() for source in given],
             by=how,  # type: ignore[arg-type]
             labels=words,
             frame=frame or "lower",
@@ -88,17 +83,3 @@ def calibrate_many(
     more = "What changed and every recording: --full, or --report FILE.html with figures."
     machine = partial(sessions_record, result.model)
     results.emit_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
-
-
-def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:
-    """Every log; with ``by`` device, every device of an archive."""
-    from trihedron.read import devices_of
-
-    for source in sources:
-        n = devices_of(source.log) if by == "device" and source.instance is None and source.log is not None else 1
-        if n == 1:
-            yield source.read()
-            continue
-        for device in range(1, n + 1):
-            recording = replace(source, instance=str(device)).read()
-            yield replace(recording, source=f"{recording.source}, device {device}")

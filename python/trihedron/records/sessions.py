@@ -8,7 +8,7 @@ from trihedron.records.calibration import Calibration
 from trihedron.records.finding import Finding, Judged
 from trihedron.records.frozen import Frozen
 
-By = Literal["session", "date", "device", "temperature"]
+By = Literal["session", "date", "temperature"]
 """Grouping of sessions: none, by the day they began, by device, or as functions of temperature."""
 
 ChangeKind = Literal["differs", "apart", "step", "trend", "scatter"]

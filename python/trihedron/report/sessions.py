@@ -35,10 +35,6 @@ SEVERAL = "Several devices"
 MOST_NAMED = 6
 ONE_SIGMA = "± 1 σ, the bias drift within a recording included"
 NEXT = f"Test them on another recording: `trihedron verify FILE OTHER_LOG`.{USE_IT}{USES}."
-NEXT_DEVICE = (
-    "Use the common parameters for a device that is not calibrated itself: `trihedron apply FILE OTHER_LOG -o "
-)
-NEXT_DEVICE += "corrected.csv`, `trihedron export FILE --to c -o calibration.h`."
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -50,8 +46,6 @@ def sessions_report(model: SessionsModel) -> Document:
         without = ", ".join(distinct_names([path for path, _ in model.left_out])[:MOST_NAMED])
         used += f" of {n + len(model.left_out)} (without {without})"
     agree = f"{used} differ by no more than their uncertainty and the bias drift within a recording"
-    if model.by == "device":
-        agree = f"{used} in one model: its uncertainty is that of a device that was not calibrated itself"
     if model.thermal is not None:
         agree = f"{used} make one model from {_range(model.thermal)}"
     sections = [
@@ -59,7 +53,7 @@ def sessions_report(model: SessionsModel) -> Document:
         Section("Findings", (findings_block(model.findings),)),
     ]
     if changed:
-        sections.append(Section("What changed", (_changes(model, changed),)))
+        sections.append(Section("What changed", (_changes(changed),)))
     if model.thermal is not None:
         sections.append(Section("Temperature", tuple(_thermal(model.thermal))))
     recordings = _sessions(model)
@@ -86,7 +80,7 @@ def sessions_report(model: SessionsModel) -> Document:
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
         lead=_lead(model),
-        next_step=(NEXT_DEVICE if model.by == "device" else NEXT) if model.is_trustworthy else "",
+        next_step=NEXT if model.is_trustworthy else "",
     )
 
 
@@ -118,7 +112,6 @@ def _facts(model: SessionsModel) -> tuple[tuple[str, str], ...]:
     how = {
         "session": "each recording for itself",
         "date": f"{how_many(n_groups, 'day')}",
-        "device": f"{how_many(n_groups, 'device')}",
         "temperature": "along temperature",
     }[model.by]
     facts = [("recordings", f"{len(model.sessions)}, {how}")]
@@ -136,9 +129,8 @@ def _repeatability(model: SessionsModel) -> list[Block]:
     if model.thermal is not None:
         return []
     grouped = any(one.between is not None for one in model.repeated)
-    between = {"date": "day to day", "device": "device to device"}.get(model.by, "between")
     head = ["parameter", "common ± σ", "session to session", "95 %"]
-    head += [between, "95 %"] if grouped else []
+    head += ["day to day", "95 %"] if grouped else []
     head += ["median σ of one"]
     kinds = ("within", "between") if grouped else ("within",)
     rows = tuple(
@@ -168,13 +160,9 @@ def repeated_cells(one: Repeated, kinds: tuple[str, ...]) -> list[str]:
     return cells
 
 
-def _changes(model: SessionsModel, changed: Sequence[Change]) -> Table:
-    with_group = model.by == "device"
-    rows = tuple(
-        (id_in_print(one.id), *([one.group] if with_group else []), plain_number(one.p_adjusted, 2), _said(one))
-        for one in changed
-    )
-    head = ("parameter", *(["device"] if with_group else []), "p", "change")
+def _changes(changed: Sequence[Change]) -> Table:
+    rows = tuple((id_in_print(one.id), plain_number(one.p_adjusted, 2), _said(one)) for one in changed)
+    head = ("parameter", "p", "change")
     caption = (
         "Changes beyond each recording's uncertainty and the drift of its biases; p corrected for multiple testing "
     )
@@ -226,8 +214,8 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
 
 def _sessions(model: SessionsModel) -> Table:
     columns = [("recording", [s.name for s in model.sessions])]
-    if model.by in ("date", "device"):
-        columns.append((model.by, [s.group for s in model.sessions]))
+    if model.by == "date":
+        columns.append(("date", [s.group for s in model.sessions]))
     if any(math.isfinite(s.temperature_degc) for s in model.sessions):
         shown_degc = ["–" if math.isnan(s.temperature_degc) else f"{s.temperature_degc:.1f}" for s in model.sessions]
         branch = [{1: "heating", -1: "cooling"}.get(s.branch, "") for s in model.sessions]

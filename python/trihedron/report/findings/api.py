@@ -233,7 +233,7 @@ _MANY_RECORDINGS = {
     ),
     **{
         ("parameters-changed", f"{parameter}-{kind}", WARNING): Words(
-            f"The {{parameter:ids}}{{is_of_device:? of {{device}}|}} {seen}.",
+            f"The {{parameter:ids}} {seen}.",
             cause,
             _MANY,
             or_severity=SERIOUS,
