@@ -400,3 +400,16 @@ def test_lost_samples_and_repeated_rows_of_a_static_log_are_each_stated_once_and
     assert [f.code for f in twice.findings].count("repeated-rows") == 1
     # A reading in two rows: half as many of them per second, each for as long as two.
     assert all(axis.terms["N"].lower < math.sqrt(2.0) * 1e-3 < axis.terms["N"].upper for axis in twice.axes)
+
+
+def test_noise_whose_level_doubles_in_half_of_the_log_is_noticed_and_makes_no_lines():
+    rng = np.random.default_rng(5)
+    level = np.where(np.arange(200_000) < 100_000, 1.0, 2.5)
+    x = 0.1 * level[:, None] * rng.normal(size=(200_000, 3))
+    for axis in identify_noise(x, 100.0).axes:
+        assert [f.numbers["ratio"] for f in axis.findings if f.code == "log-uneven"] == [pytest.approx(2.5, rel=0.05)]
+        assert not axis.lines
+        # Nothing states which part of the log is the sensor's: 64 pieces of two levels know their mean power to 9 %.
+        assert axis.terms["N"].lower < 0.01 * np.sqrt(3.625) < axis.terms["N"].upper
+    (axis,) = identify_noise(0.1 * rng.normal(size=(50_000, 1)), 100.0).axes
+    assert "log-uneven" not in {finding.code for finding in axis.findings}

@@ -48,6 +48,7 @@ FINDINGS = {
     "reference-misfit": "parts of the log disagree",
     "reference-of-itself": "reference in the log's own file",
     "static-rate-above-noise": "gyro rate in static poses above noise",
+    "log-uneven": "noise of changing level",
     "spectrum-low-pass": "low-pass in the spectrum",
     "spectrum-unexplained": "spectrum unlike the fitted terms",
     "table-tilt": "faces that contradict each other",

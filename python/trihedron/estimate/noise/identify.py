@@ -35,7 +35,7 @@ from trihedron.estimate.noise.slow_changes import (
     slow_changes,
     without,
 )
-from trihedron.estimate.noise.spectrum import ordinates, ordinates_of_means
+from trihedron.estimate.noise.spectrum import evenness, ordinates, ordinates_of_means, spread_of_mean
 from trihedron.estimate.noise.two_levels import two_levels
 from trihedron.ranges import merged
 from trihedron.records import AllanCurve, Finding
@@ -224,7 +224,8 @@ class Channel:
         self, blank: NoiseAxis, curve: AllanCurve, channel: int, heat: FloatArray | None = None
     ) -> NoiseAxis:
         """The ``blank`` axis with its terms, beside the temperature (n,), and the findings of the channel."""
-        blank = replace(blank, findings=(*self.findings, *blank.findings))
+        even, ratio = evenness(self.column) if self.head is None else (1.0, 1.0)
+        blank = replace(blank, findings=(*self.findings, *remarks.uneven(even, ratio), *blank.findings))
         if blank.sample_sigma == 0.0:
             return blank
         range_degc = remarks.UNLOGGED if heat is None else (float(np.min(heat)), float(np.max(heat)))
@@ -236,7 +237,8 @@ class Channel:
             else ordinates_of_means((x, blank.rate_hz), self.block, stretches, self.head, changes)
             for x, changes in beside_each(self.column, self.choices, self.rate_hz)
         ]
-        tails = tail_error(self.column if self.head is None else self.head)
+        # N of a level that changes is the mean of a sample of pieces.
+        tails = math.hypot(tail_error(self.column if self.head is None else self.head), 0.5 * spread_of_mean(even))
         axis = identify_axis(choices, blank, curve, channel, tails, range_degc)
         # Drift that the temperature explains is stated with it.
         others = tuple(one for one in axis.findings if one.code != "log-drift")

@@ -17,6 +17,8 @@ NAMED = 4
 """Most spectral lines that a finding lists one by one."""
 FALLEN = 0.95
 """Power at Nyquist over the terms' below which a filter shows; vibration leaves it as it is."""
+EVEN = 0.9
+"""Share of the degrees of freedom that noise of one level leaves: below it intervals are 5 % wider."""
 UNLOGGED = (math.nan, math.nan)
 """Range of a temperature that was not logged."""
 
@@ -76,6 +78,12 @@ def unexplained(deviation: float, frequency_hz: float) -> Finding:
     """Finding for a part of the spectrum that the terms do not explain."""
     tau_s = 0.5 / frequency_hz
     return Finding.of("spectrum-unexplained", deviation=deviation, frequency_hz=frequency_hz, tau_s=tau_s)
+
+
+def uneven(even: float, ratio: float) -> Iterator[Finding]:
+    """Finding for a level of noise that changes along the log, so far that it costs a tenth of the readings."""
+    if even < EVEN:
+        yield Finding.of("log-uneven", ratio=ratio)
 
 
 def changes(found: Sequence[SlowChange], unit: str, heat: FloatArray | None = None) -> Iterator[Finding]:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.noise.gaps import (
     MOST_BRIDGED,
@@ -134,7 +134,7 @@ def ordinates(
         block = max(block, SCATTERED_BLOCK)
         # With losses, slow noise masks fast noise: only the means are used, up to half their ordinates.
         used = 2 if slow_over_fast(x) > MOST_SLOW else USED_SHARE
-    bands: list[Ordinates] = []
+    bands, (even, _) = list[Ordinates](), evenness(x)
     for start, stop in stretches:
         runs = block_means(x[start:stop], block)
         step_s, start_s = block / rate_hz, start / rate_hz
@@ -146,7 +146,33 @@ def ordinates(
             f"no stretch of the log is long enough to separate noise terms: the longest has "
             f"{max((b - a for a, b in stretches), default=0)} readings; record longer or exclude less"
         )
-    return bands
+    return [replace(band, count=even * band.count) for band in bands]
+
+
+def spread_of_mean(even: float) -> float:
+    """Relative standard error of a mean power over the pieces of a log of this evenness."""
+    return math.sqrt((1.0 / even - 1.0) / PIECES)
+
+
+PIECES = 64
+TENTHS = np.array([0.1, 0.9])
+
+
+def evenness(x: FloatArray) -> tuple[float, float]:
+    """Share of the degrees of freedom of ``x`` (n,) that a level of noise which changes along the log leaves: (mean s)²
+    over mean s², s the powers of the differences of readings in pieces, without their own scatter; and the level of the
+    loudest tenth of pieces over that of the quietest."""
+    length = len(x) // PIECES
+    step = np.diff(x[: length * PIECES].reshape(PIECES, length), axis=1) ** 2
+    count = np.isfinite(step).sum(axis=1)
+    full = count >= max(length // 2, 2)
+    power = np.nansum(step[full], axis=1) / count[full]
+    if not np.any(power > 0.0):
+        return 1.0, 1.0
+    # Squared differences of white noise are correlated: their mean has 2/3 of a degree of freedom each.
+    excess = float(np.var(power) / np.mean(power) ** 2 - np.mean(3.0 / count[full]))
+    quiet, loud = np.sqrt(np.quantile(power, TENTHS)).tolist()
+    return 1.0 / (1.0 + max(excess, 0.0)), loud / max(quiet, TINY)
 
 
 def ordinates_of_means(

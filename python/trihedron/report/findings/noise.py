@@ -12,6 +12,11 @@ _LOG = {
         "the log was written faster than the sensor measures, or resampled by holding the last value.",
         "N and Q then depend on the resampling; log at the sensor's own rate.",
     ),
+    ("log-uneven", "", WARNING): Words(
+        "The noise changes along the log: in its loudest tenth it is {ratio:.2g} times that of the quietest.",
+        "vibration that comes and goes (a fan, a machine), or a range or filter that changed.",
+        "N is a mean over these levels; leave one of them: `trihedron allan LOG --exclude FROM:TO`.",
+    ),
     ("log-jump", "", WARNING): Words(
         "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit:unit} at {time_s:.1f} s.",
         "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise.",
