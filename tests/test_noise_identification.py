@@ -407,7 +407,8 @@ def test_noise_whose_level_doubles_in_half_of_the_log_is_noticed_and_makes_no_li
     level = np.where(np.arange(200_000) < 100_000, 1.0, 2.5)
     x = 0.1 * level[:, None] * rng.normal(size=(200_000, 3))
     for axis in identify_noise(x, 100.0).axes:
-        assert [f.numbers["ratio"] for f in axis.findings if f.code == "log-uneven"] == [pytest.approx(2.5, rel=0.05)]
+        # Levels of 3125 readings are known to 1.5 %; of 32 pieces each the loudest and the quietest.
+        assert [f.numbers["ratio"] for f in axis.findings if f.code == "log-uneven"] == [pytest.approx(2.6, rel=0.07)]
         assert not axis.lines
         # Nothing states which part of the log is the sensor's: 64 pieces of two levels know their mean power to 9 %.
         assert axis.terms["N"].lower < 0.01 * np.sqrt(3.625) < axis.terms["N"].upper

@@ -238,7 +238,7 @@ def test_colouring_of_the_phone_log_is_recognised_and_terms_come_from_below(real
     for axis in found.axes:
         assert "spectrum-low-pass" in codes(axis)
         # The spectrum falls to 0.4 % by 5 Hz and is flat below 0.15 Hz.
-        assert axis.highest_hz < 0.2
+        assert axis.highest_hz < 0.25
         assert not axis.terms[TermName.QUANTISATION].is_present
 
 

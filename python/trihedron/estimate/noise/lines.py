@@ -18,7 +18,7 @@ TOLERANCE = 0.05
 noise terms are idealisations, and a smaller loss of white noise does not change a printed digit."""
 MOST_LINES = 24
 FLOOR = 0.5
-"""Least share of the sensor's white noise at Nyquist beside a process; a low-pass filter leaves none."""
+"""Least share of white noise in the power at Nyquist beside a process; behind a low-pass there is only rounding."""
 
 
 def find_lines(bands: Sequence[Ordinates], model: Model, step_s: float) -> tuple[list[SpectralLine], list[BoolArray]]:

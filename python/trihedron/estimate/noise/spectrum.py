@@ -155,13 +155,12 @@ def spread_of_mean(even: float) -> float:
 
 
 PIECES = 64
-TENTHS = np.array([0.1, 0.9])
 
 
 def evenness(x: FloatArray) -> tuple[float, float]:
     """Share of the degrees of freedom of ``x`` (n,) that a level of noise which changes along the log leaves: (mean s)²
     over mean s², s the powers of the differences of readings in pieces, without their own scatter; and the level of the
-    loudest tenth of pieces over that of the quietest."""
+    loudest piece over that of the quietest."""
     length = len(x) // PIECES
     step = np.diff(x[: length * PIECES].reshape(PIECES, length), axis=1) ** 2
     count = np.isfinite(step).sum(axis=1)
@@ -171,8 +170,7 @@ def evenness(x: FloatArray) -> tuple[float, float]:
         return 1.0, 1.0
     # Squared differences of white noise are correlated: their mean has 2/3 of a degree of freedom each.
     excess = float(np.var(power) / np.mean(power) ** 2 - np.mean(3.0 / count[full]))
-    quiet, loud = np.sqrt(np.quantile(power, TENTHS)).tolist()
-    return 1.0 / (1.0 + max(excess, 0.0)), loud / max(quiet, TINY)
+    return 1.0 / (1.0 + max(excess, 0.0)), math.sqrt(float(power.max()) / max(float(power.min()), TINY))
 
 
 def ordinates_of_means(
