@@ -76,21 +76,18 @@ def test_few_losses_leave_outliers_and_many_a_scale_that_is_not_to_be_trusted(sh
     assert np.abs(z).max() < 4.0
 
 
-def session(share, seed, move_s=2.0, grade="mpu"):
-    """A session at 100 Hz from which a share of all rows is missing, numbered anew."""
-    motion = hand_session(14, pose_s=2, first_pose_s=6, move_s=move_s, layout=seed)
-    log, _ = simulate(unit_of(motion, seed, grade), seed)
-    kept = np.random.default_rng(seed).random(log.n_samples) >= share
-    return replace(
-        log, time_s=np.arange(kept.sum()) / 100.0, accelerometer=log.accelerometer[kept], gyroscope=log.gyroscope[kept],
-        temperature_degc=None, supply_v=None,
-    )  # fmt: skip
+def numbered_anew(log, kept):
+    """The rows of a log that were kept, at its rate."""
+    readings = log.accelerometer[kept], log.gyroscope[kept]
+    units = {"accelerometer_unit": log.accelerometer_unit, "gyroscope_unit": log.gyroscope_unit}
+    return Recording.from_arrays(None, *readings, rate_hz=log.rate_hz, **units)
 
 
 @pytest.mark.parametrize(("grade", "move_s"), [("mpu", 0.4), ("adis", 2.0)])
 def test_healthy_logs_with_brisk_or_slow_moves_lose_nothing(grade, move_s):
     for seed in (5, 6):
-        log = session(0.0, seed, move_s, grade)
+        motion = hand_session(14, pose_s=2, first_pose_s=6, move_s=move_s, layout=seed)
+        log, _ = simulate(unit_of(motion, seed, grade), seed)
         assert missing_samples(log, segment_recording(log), 1e-3) == []
 
 
@@ -136,9 +133,7 @@ def test_several_samples_lost_at_a_time_are_counted_at_the_joints_that_show_as_m
         is_lost = np.zeros(made.n_samples, dtype=bool)
         for first in np.flatnonzero(np.random.default_rng(seed).random(made.n_samples) < 0.01):
             is_lost[first : first + 3] = True
-        units = {"accelerometer_unit": made.accelerometer_unit, "gyroscope_unit": made.gyroscope_unit}
-        readings = made.accelerometer[~is_lost], made.gyroscope[~is_lost]
-        log = Recording.from_arrays(None, *readings, rate_hz=made.rate_hz, **units)
+        log = numbered_anew(made, ~is_lost)
         (found,) = missing_samples(log, segment_recording(log), 1e-4)
         beyond += found.numbers["lost_share"] - is_lost.mean()
         variance += found.numbers["sigma_lost_share"] ** 2
@@ -151,11 +146,7 @@ def test_losses_that_the_fit_puts_back_leave_its_scales_trusted_and_right():
     segments = segment_recording(whole)
     middles = [(move.start + move.stop) // 2 for move in segments.moves[1::3]]
     kept = np.setdiff1d(np.arange(whole.n_samples), [k + i for k in middles for i in range(3)])
-    log = Recording.from_arrays(
-        None, whole.accelerometer[kept], whole.gyroscope[kept],
-        rate_hz=whole.rate_hz, accelerometer_unit="counts", gyroscope_unit="counts",
-    )  # fmt: skip
-    plain = calibrate(log, gravity_m_s2=truth.gravity_m_s2)
+    plain = calibrate(numbered_anew(whole, kept), gravity_m_s2=truth.gravity_m_s2)
     assert "samples-lost" in {one.code for one in plain.findings if one.severity is Severity.SERIOUS}
     found = extend(plain).calibration
     assert found.is_trustworthy
