@@ -211,7 +211,7 @@ def test_a_log_read_faster_than_the_sensor_measures_is_read_as_what_the_sensor_m
     np.testing.assert_array_equal(recording.accelerometer, table[np.unique(row), 1:4])
     again = finding(recording, "repeated-rows")
     assert again.numbers["rows_left_out"] == len(row) - len(np.unique(row))
-    assert again.severity is Severity.WARNING
+    assert again.severity is Severity.NOTE
     assert recording.rate_hz == pytest.approx(100, rel=1e-3)
 
 

@@ -190,7 +190,7 @@ _ROWS = {
         "{rows_left_out} rows are copies of the row before, timestamp included (first: {where}); they were excluded.",
         "A logger that writes a row twice, or a stream joined with itself.",
     ),
-    ("repeated-rows", "read-again", WARNING): Words(
+    ("repeated-rows", "read-again", NOTE): Words(
         "{rows_left_out} rows ({share:.3g %}) repeat all readings of the row before (first: {where}); they are no "
         "samples and were excluded.",
         "A program that reads the sensor more often than it measures.",
