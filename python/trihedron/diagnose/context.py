@@ -13,11 +13,10 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.slope import slope_of
 from trihedron.sensor_model import axis_scales
+from trihedron.session.noise import QUIET
 
 VIBRATION_WINDOW_S = 0.25
 """Window of the parabola that follows the motion while vibration is measured in a move."""
-QUIET = 0.1
-"""Quantile over the poses that is taken for the power of a pose without vibration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,13 +244,8 @@ class Context:
         In moves the slow motion is removed by a local parabola. The part of the vibration that the parabola removes
         too is restored by the ratio found in the vibrating poses.
         """
-        obs = self.obs
-        poses = self.pose_power
-        floor = np.quantile(poses, QUIET, axis=0)
-        out = np.zeros((self.n_points, 3))
-        out[: obs.n_poses] = np.maximum(poses - floor, 0.0)
+        obs, S, poses = self.obs, self.fitted.state.accel_S, self.pose_power
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
-
         # Weights of the least-squares parabola at the middle of the window (Savitzky-Golay filter).
         parabola = np.linalg.pinv(np.vander(np.arange(width) - width // 2, 3))[2]
 
@@ -261,15 +255,12 @@ class Context:
             away = force - convolve1d(force, parabola, axis=0, mode="nearest")
             return np.asarray(uniform_filter1d(away**2, width, axis=0, mode="nearest"))
 
-        inside = np.array(
-            [rough(obs.raw_force[pose.start : pose.stop] @ self.fitted.state.accel_S.T).mean(axis=0)
-             for pose in obs.segments.poses]
-        )  # fmt: skip
-        quiet = np.quantile(inside, QUIET, axis=0)
-        passed = (inside - quiet).sum() / max(float((poses - floor).sum()), TINY)
-        for where in self.moves:
-            out[where] = np.maximum(rough(self.force[where]) - quiet, 0.0) / np.clip(passed, 0.1, 1.0)
-        return out
+        spans = obs.segments.spans.tolist()
+        inside = np.array([rough(obs.raw_force[start:stop] @ S.T).mean(axis=0) for start, stop in spans])
+        quiet, floor = (np.quantile(power, QUIET, axis=0) for power in (inside, poses))
+        passed = np.clip((inside - quiet).sum() / max(float((poses - floor).sum()), TINY), 0.1, 1.0)
+        in_moves = [(rough(self.force[where]) - quiet) / passed for where in self.moves]
+        return np.asarray(np.maximum(np.concatenate([poses - floor, *in_moves]), 0.0))
 
     def between_poses(self, per_pose: FloatArray) -> FloatArray:
         """(points, ...) a quantity of the poses, interpolated in moves by the fraction of the angle turned so far."""

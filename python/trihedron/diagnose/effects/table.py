@@ -6,52 +6,45 @@ import numpy as np
 from scipy.special import chdtrc, ndtr, stdtrit
 
 from trihedron.arrays import FloatArray
+from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import DirectEffect, Evidence
-from trihedron.probability import CLEAR, SURE
+from trihedron.probability import CLEAR, SURE, bdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 from trihedron.records.words import why_not
 from trihedron.session.rounding import UNIFORM, undithered_axes
 
 NEAR_DEG = 12.0
-"""Distance from a multiple of 90° within which an intended one ends; moves by hand end anywhere."""
-MOST_SWING_DEG = 8.0
-"""On a table tilted by 4° half a turn moves the vertical in the body by twice that."""
-MOST_ACROSS = 0.25
-"""Rate across the vertical over that about it: on a table the axis stays within 14° of the vertical."""
-FEWEST_TURNS, NEARLY_ALL = 4, 0.7
-"""Hand moves end near a multiple by chance in 27 %: three of four do in 6 %, eight of ten in 1 of 1500 sessions."""
-HALF_RIGHT_RAD = np.pi / 4
-"""45°: a smaller angle is nearer to 0° than to 90°."""
+"""Distance from a multiple of 90°, and of the vertical in the body from where it was, within which an intended rotation
+ends; moves by hand end anywhere."""
+ORDINARY_DEG = 0.05
+"""Feet, dust, hands and a stop tilt and turn a case by a few hundredths of a degree on any table."""
 
 
 @dataclass(frozen=True, eq=False)
 class TableTurn:
-    """One move about the vertical between two poses of the same face: angle and its error to a multiple of 90°."""
+    """One move about the vertical between two poses of the same face: angle, the nearest number of right angles."""
 
     move: int
     angle_rad: float
-    error_rad: float
+    right_angles: int
+
+    @property
+    def error_rad(self) -> float:
+        """Distance from the multiple of 90°."""
+        return self.angle_rad - 0.5 * np.pi * self.right_angles
 
 
 def table_turns(context: Context) -> list[TableTurn]:
-    """Moves about the vertical throughout: the vertical in the body is the same before and after."""
-    state = context.fitted.state
-    out = []
+    """Moves about the vertical: it is the same in the body before and after."""
+    up, out = context.fitted.state.up, []
     for m, where in enumerate(context.moves):
         before, after = context.obs.move_poses[m]
-        up = state.up[before]
-        if up @ state.up[after] < np.cos(np.radians(MOST_SWING_DEG)):
-            continue
-        t = context.time_s[where]
-        about_up = context.rate[where] @ up
-        across = np.linalg.norm(context.rate[where] - np.outer(about_up, up), axis=1)
-        angle = float(np.trapezoid(about_up, t))
-        if abs(angle) < HALF_RIGHT_RAD or np.mean(across) > MOST_ACROSS * np.mean(np.abs(about_up)):
-            continue
-        error = (angle + HALF_RIGHT_RAD) % (2.0 * HALF_RIGHT_RAD) - HALF_RIGHT_RAD
-        out.append(TableTurn(m, angle, float(error)))
+        angle = float(np.trapezoid(context.rate[where] @ up[before], context.time_s[where]))
+        right_angles = round(angle / (0.5 * np.pi))
+        if right_angles and up[before] @ up[after] > np.cos(np.radians(NEAR_DEG)):
+            out.append(TableTurn(m, angle, right_angles))
     return out
 
 
@@ -61,16 +54,10 @@ class TableEffect(DirectEffect):
     of_session = None
 
     def unavailable(self, context: Context) -> str | None:
-        """Unless at least four rotations, nearly all of them close to a multiple of 90°, are meant as such."""
+        """Unless more rotations end near a multiple of 90° than moves by hand do by chance."""
         near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in table_turns(context)]
-        is_there = len(near) >= FEWEST_TURNS and float(np.mean(near)) > NEARLY_ALL
-        return None if is_there else why_not("no-table-turns")
-
-
-LEAST_SINE = 0.3
-"""Least sine of half the rotation: below 35° the vertical moves by less than 0.6 of the tilt."""
-ORDINARY_DEG = 0.05
-"""Feet, dust, hands and a stop tilt and turn a case by a few hundredths of a degree on any table."""
+        by_chance = bdtrc(sum(near) - 1, len(near), NEAR_DEG / 45.0) if any(near) else 1.0
+        return None if by_chance < FALSE_ALARM else why_not("no-table-turns")
 
 
 def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
@@ -95,11 +82,12 @@ class TableTilt(TableEffect):
         found = []
         for turn in table_turns(context):
             before, after = obs.move_poses[turn.move]
-            half = abs(np.sin(turn.angle_rad / 2.0))
-            if half >= LEAST_SINE:
+            # After whole turns the vertical returns, on a tilted table too.
+            if turn.right_angles % 4:
                 variance = obs.pose_force_sigma[before] ** 2 + obs.pose_force_sigma[after] ** 2
                 sigma = float(np.sqrt((state.accel_S**2 @ variance).mean())) / state.gravity
-                found.append((np.linalg.norm(state.up[after] - state.up[before]), sigma, 2.0 * half))
+                change = float(np.linalg.norm(state.up[after] - state.up[before]))
+                found.append((change, sigma, 2.0 * abs(np.sin(0.5 * turn.angle_rad))))
         if not found:
             return None
         change, sigmas, gain = np.array(found).T

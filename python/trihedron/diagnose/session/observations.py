@@ -16,7 +16,7 @@ from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
 from trihedron.session.averaging import sharpened
 from trihedron.session.model import Prior, SessionReadings, SessionState
-from trihedron.session.noise import along_gradient, measure_noise
+from trihedron.session.noise import FEWEST_READINGS, along_gradient, measure_noise
 from trihedron.session.rounding import (
     UNIFORM,
     biases_by_codes,
@@ -29,8 +29,6 @@ from trihedron.session.support import Support, support_of
 UNSTEADY = 2.0
 """Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
 have an uncertainty of a fifth."""
-FEWEST_SAMPLES = 64
-"""A spectrum of fewer samples has too few frequencies to separate a line from the noise around it."""
 LONGEST_MOVE_S = 180.0
 """Longest move that is integrated, s: hand moves take seconds, a fixture minutes; beyond it the bias dominates."""
 
@@ -286,7 +284,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
         new_mean, new_error = mean.copy(), error.copy()
         for k, pose in enumerate(segments.poses):
             part = readings[pose.start : pose.stop]
-            if pose.disturbed or len(part) < FEWEST_SAMPLES or not np.isfinite(part).all():
+            if pose.disturbed or len(part) < FEWEST_READINGS or not np.isfinite(part).all():
                 continue
             found = _core.pose_beside_lines(part, sigma)
             if found is None:
