@@ -3,6 +3,7 @@
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::f64::consts::PI;
 use trihedron::rotation::exp;
+use trihedron::session_model::gaps::find_gaps;
 use trihedron::session_model::moves::{Move, MoveNoise};
 use trihedron::session_model::{Session, State, StaticMeans};
 
@@ -78,6 +79,7 @@ pub fn made(n_poses: usize, n: usize, scatter: bool) -> (Session, State) {
         ));
         first_point += n;
     }
+    find_gaps(&mut moves);
     let noise_force = Vector3::new(1e-3, 1.2e-3, 0.9e-3);
     let noise_rate = Vector3::new(0.02, 0.03, 0.025);
     let at_rest = |mean: Vec<Vector3<f64>>, density: Vector3<f64>| {
