@@ -248,7 +248,7 @@ def test_a_refusal_is_told_from_a_defect():
 
 # Calls that a handler of ValueError may stand round.
 CONVERSIONS = {
-    "api/capturing.py: float",
+    "api/naming_columns.py: float",
     "api/reading_arrays.py: np.ma.asanyarray",
     "fleet/running.py: json.loads",
     "fleet/running.py: path.read_text",

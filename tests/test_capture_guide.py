@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.api.guiding import conclude, examine, part_of, readings_of, steps
+from trihedron.api.guiding import conclude, examine, part_of
+from trihedron.api.replaying import readings_of, steps
 from trihedron.capture.guide import Guide, Stillness
 from trihedron.cli import main
 from trihedron.cli.screen import as_text

@@ -59,7 +59,6 @@ if TYPE_CHECKING:
     from trihedron.api.extending import extend as extend
     from trihedron.api.filter_noising import filter_noise as filter_noise
     from trihedron.api.filtering import kalman as kalman
-    from trihedron.api.guiding import guide as guide
     from trihedron.api.identifying import allan as allan
     from trihedron.api.planning import plan as plan
     from trihedron.api.ranking import rank as rank
@@ -67,6 +66,7 @@ if TYPE_CHECKING:
     from trihedron.api.reading import read as read
     from trihedron.api.reading import segment as segment
     from trihedron.api.references import calibrate_references as calibrate_references
+    from trihedron.api.replaying import guide as guide
     from trihedron.api.sessions import calibrate_sessions as calibrate_sessions
     from trihedron.api.simulating import simulate as simulate
     from trihedron.api.simulating import twin as twin
@@ -114,7 +114,7 @@ _PUBLIC = {
     "api.ranking": "rank",
     "api.reading": "convert read segment",
     "api.references": "calibrate_references",
-    "api.guiding": "guide",
+    "api.replaying": "guide",
     "api.sessions": "calibrate_sessions",
     "api.simulating": "simulate twin",
     "api.verifying": "verify",

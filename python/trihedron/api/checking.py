@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from trihedron.api.calibrating import calibrate
-from trihedron.api.diagnosing import MOSTLY, TWO_ORIENTATIONS, is_static_log
+from trihedron.api.diagnosing_static_log import MOSTLY, TWO_ORIENTATIONS, is_static_log
 from trihedron.api.reading import COUNTS_OF_POSES, FEWEST_POSES, AnyRecording, recording_of, segment
 from trihedron.errors import INPUT_ERRORS
 from trihedron.records import Finding, Recording, Segments, Severity

@@ -13,8 +13,9 @@ from trihedron.comparison.fitted import as_read, model_of_diagnosis
 from trihedron.comparison.frames import judged_by_motion, rates_of_world, sign_of_gravity
 from trihedron.comparison.model import compared, with_noise_stage
 from trihedron.comparison.noise import Sampled, compare_noise, sampled
-from trihedron.comparison.rows import stated_ranges
-from trihedron.comparison.slow import correlation_times, quantisation_noise, slow_noise
+from trihedron.comparison.quantisation import quantisation_noise
+from trihedron.comparison.ranges import stated_ranges
+from trihedron.comparison.slow import correlation_times, slow_noise
 from trihedron.diagnose import diagnose_recording
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.verification import verify_calibration

@@ -17,8 +17,8 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.comparison.fitted import model_of_diagnosis
 from trihedron.comparison.frames import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
-from trihedron.comparison.rows import SENSOR
-from trihedron.comparison.slow import white_and_quantisation
+from trihedron.comparison.quantisation import white_and_quantisation
+from trihedron.comparison.ranges import SENSOR
 from trihedron.documents import parse_toml
 from trihedron.files.scenario import improved_scenario
 from trihedron.records.results import DiagnosisResult

@@ -28,7 +28,7 @@ def demo(folder: Path | None = None, seed: int | None = None, force: bool = Fals
 
     result, verified, document = demonstrate(target, overwrite=force, say=step)
     put(to_text(document, style=style()))
-    from trihedron.api.demonstrating import disagree
+    from trihedron.api.disagreeing import disagree
 
     drawn = secrets.randbelow(1_000_000) if seed is None else seed
     typer.echo("")

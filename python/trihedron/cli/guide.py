@@ -42,7 +42,7 @@ def guide(
     force: bool = False,
 ) -> None:
     """Replay a log through the guide of capture, which names the next pose after each, then calibrate and verify."""
-    from trihedron.api.guiding import replay
+    from trihedron.api.replaying import replay
     from trihedron.cli.output import check_outputs, put
     from trihedron.cli.screen import as_text
     from trihedron.records.guiding import Accuracy
@@ -119,8 +119,8 @@ def run_guided(
     seconds: float | None,
 ) -> Any:
     """Capture with the guide; returns the guide, which has the start of the verification."""
-    from trihedron.api.capturing import sensor_columns
     from trihedron.api.guiding import examine
+    from trihedron.api.naming_columns import sensor_columns
     from trihedron.api.reading import read
     from trihedron.capture.guide import Guide
     from trihedron.records.guiding import Accuracy

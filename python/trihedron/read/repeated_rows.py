@@ -19,22 +19,26 @@ BY_CHANCE = 1e-3
 """Probability below which equal readings under equal timestamps are copies: one log of a thousand is wrong."""
 WINDOW = 64
 """Rows over which axes repeat their readings independently; over longer ones they all do so in poses."""
-
-
 RARE = 0.01
 """Share of samples that may equal the previous one by chance: excluded with those that were read again, they shift a
 mean by a hundredth of an LSB at most."""
-FARTHER = 8
-"""Distances, beyond the longest run of equal rows, at which rows are compared."""
+FIRST = 1 << 16
+"""Samples at the start of a log in which it shows that a program reads faster than the sensor measures."""
+LAGS = 8
+"""Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
 
 
 def without_repeated_rows(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
     """The clock without rows that are no samples: copies of the previous row, and readings read again before the
     sensor measured anew, at the time when they were read first."""
-    rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
-    readings = [table.columns[column] for column in chosen.readings]
-    for is_copy in (True, False) if chosen.time is not None else ():
-        again = _copied_rows(readings, clock.time_s, rows) if is_copy else _rows_read_again(readings, rows)
+    readings = [values for column in chosen.readings if len(values := table.columns[column])]
+    for is_copy in (True, False) if chosen.time is not None and readings else ():
+        # A long log is indexed only where there is something to look for.
+        if not (steps_of(clock.time_s).same if is_copy else _are_read_again(readings, clock.rows)):
+            continue
+        rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
+        every = np.arange(1, len(rows))
+        again = _copied_rows(readings, clock.time_s, rows) if is_copy else every[_repeats(readings, rows, every).all(0)]
         if not len(again) or len(rows) - len(again) < FEWEST_ROWS:
             continue
         findings.append(
@@ -48,8 +52,7 @@ def without_repeated_rows(table: Table, chosen: Columns, clock: Clock, findings:
                 row=rows[again[0]],
             )
         )
-        rows = np.delete(rows, again)
-        clock = Clock(np.delete(clock.time_s, again), clock.start_s, rows, clock.findings)
+        clock = Clock(np.delete(clock.time_s, again), clock.start_s, np.delete(rows, again), clock.findings)
     return clock
 
 
@@ -62,8 +65,6 @@ def _copied_rows(
     arrival share timestamps, and coarse codes or a sensor slower than the log repeat readings: how often, rows with
     timestamps of their own show, by all axes together and by each.
     """
-    if not steps_of(time_s).same:
-        return rows[:0]
     is_same = np.diff(time_s) == 0
     again, apart = np.flatnonzero(is_same) + 1, np.flatnonzero(~is_same)[:PART] + 1
     copies = again[_repeats(columns, rows, again).all(axis=0)]
@@ -72,21 +73,21 @@ def _copied_rows(
     return copies if _are_more(len(copies), len(again), chance) else again[:0]
 
 
-def _rows_read_again(
-    columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger]
-) -> npt.NDArray[np.signedinteger]:
-    """Samples (k,) whose readings all repeat the previous sample's, if more do so than by chance and chance is rare."""
-    first = np.arange(1, min(len(rows), PART))
-    repeats = _repeats(columns, rows, first)
-    is_again = repeats.all(axis=0)
-    if len(repeats) < 4 or not _are_more(int(is_again.sum()), len(first), _independent(repeats)):
-        return rows[:0]
-    longest = int(np.diff(np.flatnonzero(np.r_[True, ~is_again, True])).max())
-    farther = [k for k in range(longest, longest + FARTHER) if k < len(first)]
-    if max((_repeats(columns, rows, first[k:], k).all(axis=0).mean() for k in farther), default=1.0) > RARE:
-        return rows[:0]
-    every = np.arange(1, len(rows))
-    return every[_repeats(columns, rows, every).all(axis=0)]
+def _are_read_again(columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger] | None) -> bool:
+    """Whether more of the first samples repeat all readings of the previous one than by chance, and chance is rare."""
+    first = np.stack([values[:FIRST] if rows is None else values[rows[:FIRST]] for values in columns], axis=1)
+    repeats = first[1:] == first[:-1]
+    is_again = repeats.all(axis=1)
+    if not _are_more(int(is_again.sum()), len(repeats), _independent(repeats.T)):
+        return False
+    return equal_apart(first, int(np.diff(np.flatnonzero(np.r_[True, ~is_again, True])).max())) <= RARE
+
+
+def equal_apart(readings: FloatArray, longest: int) -> float:
+    """Share of rows (n, k) equal to one further back than the ``longest`` run of repeated rows reaches."""
+    lags = [lag for lag in range(longest + 1, longest + 1 + LAGS) if lag < len(readings)]
+    shares = [float(np.mean(np.all(readings[lag:] == readings[:-lag], axis=1))) for lag in lags]
+    return sum(shares) / max(len(shares), 1)
 
 
 def _independent(repeats: npt.NDArray[np.bool_]) -> float:
@@ -102,11 +103,8 @@ def _are_more(count: int, n: int, chance: float) -> bool:
 
 
 def _repeats(
-    columns: Sequence[FloatArray],
-    rows: npt.NDArray[np.signedinteger],
-    at: npt.NDArray[np.signedinteger],
-    distance: int = 1,
+    columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger], at: npt.NDArray[np.signedinteger]
 ) -> npt.NDArray[np.bool_]:
-    """(1 + axes, k) whether readings of the samples ``at`` (k,) equal those ``distance`` before; row 0 is true."""
-    equal = [values[rows[at]] == values[rows[at - distance]] for values in columns if len(values)]
+    """(1 + axes, k) whether readings of the samples ``at`` (k,) equal those of the previous sample; row 0 is true."""
+    equal = [values[rows[at]] == values[rows[at - 1]] for values in columns]
     return np.array([np.ones(len(at), dtype=bool), *equal])

@@ -10,6 +10,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.quiet import Windows
 from trihedron.read.audit.repeats import Repeats
 from trihedron.read.clock.rate import usual_step
+from trihedron.read.repeated_rows import equal_apart
 from trihedron.read.turning import Turning
 from trihedron.records import Finding, Severity
 from trihedron.records.channel_facts import ChannelFacts, Limit
@@ -58,8 +59,6 @@ def _clipped(sensor: str, limits: list[Limit], place: Place, *, is_static: bool)
 
 
 Place = Callable[[int], str]
-LAGS = 8
-"""Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
 MANY = 0.05
 """Share of a log that is not finite from which on the finding is serious."""
 
@@ -102,7 +101,7 @@ def _repeated(sensor: str, readings: FloatArray, repeats: Repeats, place: Place)
     seen = repeats.count[3] / n
     if _is_repeated(seen, expected, repeats):
         # Axes of corrected readings are mixed and not independent: rows equal apart as often as next to each other.
-        expected = max(expected, _equal_apart(readings, int(repeats.longest[3])))
+        expected = max(expected, equal_apart(readings, int(repeats.longest[3])))
     if not _is_repeated(seen, expected, repeats):
         return []
     longest = int(repeats.longest[3])
@@ -127,13 +126,6 @@ def _is_repeated(seen: float, expected: float, repeats: Repeats) -> bool:
     # each axis repeats as often, and twice that chance is out of reach.
     limit = expected + 6.0 * np.sqrt(max(expected, 1.0 / n) / n)
     return bool(seen > max(limit, 2.0 * expected / (1.0 + expected)) and repeats.count[3] >= 5)
-
-
-def _equal_apart(readings: FloatArray, longest: int) -> float:
-    """Share of rows (n, 3) equal to one further back than the ``longest`` run of repeated rows reaches."""
-    lags = [lag for lag in range(longest + 1, longest + 1 + LAGS) if lag < len(readings)]
-    shares = [float(np.mean(np.all(readings[lag:] == readings[:-lag], axis=1))) for lag in lags]
-    return sum(shares) / max(len(shares), 1)
 
 
 def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Finding]:

@@ -21,7 +21,7 @@ COMPARED: Mapping[str, str] = MappingProxyType(
         "recording's.",
         "filtered-once": "The noise of the {sensor} {axis:axis} is filtered in the {side} only (corner "
         "{corner_hz:.3g} Hz).",
-        # the converter
+        # the ADC
         "resolution-missing": "The {side} has no resolution (LSB) on the {sensor}.",
         "resolution-ratio": "The resolution (LSB) of the {sensor} is {ratio:.3g} times the recording's.",
         "quantisation-ratio": "Quantisation noise of the {sensor} {axis} is {ratio:.2g} times the recording's.",
