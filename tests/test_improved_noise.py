@@ -16,7 +16,7 @@ from trihedron.channel_facts.low_pass import gain_of
 from trihedron.comparison.fitted import model_of_calibration
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.noise import sampled as sampled_of
-from trihedron.comparison.slow import quantisation_noise, white_and_quantisation
+from trihedron.comparison.quantisation import quantisation_noise, white_and_quantisation
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Recording
 from trihedron.simulate import NoiseTerms, Smoother, hand_session, low_pass_like, make_noise, noise_of_octaves, simulate
