@@ -28,7 +28,7 @@ def real_data() -> Path:
 @pytest.fixture
 def few_simulations(monkeypatch):
     """Improved scenarios are aimed by two simulations and not by eight: enough where their files are what is tested."""
-    monkeypatch.setattr("trihedron.api.driving.N_SEEDS", 2)
+    monkeypatch.setattr("trihedron.comparison.driving.N_SEEDS", 2)
 
 
 @pytest.fixture(scope="module")

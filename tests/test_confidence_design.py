@@ -13,7 +13,7 @@ from confidence.sensor import lower, recorded
 from confidence.sessions import hand
 from trihedron import calibrate
 from trihedron.api.planning import POSE_SETS
-from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
+from trihedron.estimate.gyroscope.turn_design import design_moves, design_turns
 
 
 def calibrated(seed, **levels):
@@ -173,7 +173,7 @@ def level_turns(stops):
         for part in range(stops + 1):
             begun = 0.5 * math.pi * part / (stops + 1)
             now = math.cos(begun) * up + math.sin(begun) * np.cross(up, axis)
-            moves.append(PlannedMove(now, axis, 0.5 * math.pi / (stops + 1)))
+            moves.append((now, axis * 0.5 * math.pi / (stops + 1)))
     return moves
 
 

@@ -13,10 +13,10 @@ import yaml
 
 import trihedron
 from reference_rig import FINE_HZ, G, forces, hand, rates_of
-from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_log
 from trihedron.api.referring import motion_of
 from trihedron.estimate.filter_noise import beside_reference as beside
 from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_or_not, informed, parts_of
+from trihedron.estimate.filter_noise.findings import noticed, too_sure, unlike_this_log
 from trihedron.estimate.filter_noise.left_over import PARTS, drawn_errors, mean_square, of_temperature
 from trihedron.estimate.filter_noise.strengths import Prior, _slope, bounded, fit, height, most_likely
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, errors_over, parts_of_walk, walked

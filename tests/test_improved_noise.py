@@ -11,8 +11,8 @@ from scipy.stats import binom
 import trihedron
 from diagnosed_session import unit_of
 from trihedron.api import improving
-from trihedron.api.driving import MovedAlike, bias_scatter
 from trihedron.channel_facts.low_pass import gain_of
+from trihedron.comparison.driving import MovedAlike, bias_scatter
 from trihedron.comparison.fitted import model_of_calibration
 from trihedron.comparison.noise import Sampled
 from trihedron.comparison.noise import sampled as sampled_of

@@ -6,9 +6,9 @@ import os
 from dataclasses import dataclass, replace
 
 from trihedron.api.calibrating import calibrate
-from trihedron.api.driving import MovedAlike, driven
 from trihedron.api.reading import accelerometer_only, read, segment
 from trihedron.api.simulating import names_scenario, scenario_of
+from trihedron.comparison.driving import MovedAlike, driven
 from trihedron.comparison.fitted import as_read, model_of_diagnosis
 from trihedron.comparison.frames import judged_by_motion, rates_of_world, sign_of_gravity
 from trihedron.comparison.model import compared, with_noise_stage

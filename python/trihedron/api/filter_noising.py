@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from trihedron.api.choices import settle_gravity
-from trihedron.api.filter_noise_findings import noticed, too_sure, unlike_this_log
 from trihedron.api.identifying import allan
 from trihedron.api.reading import AnyRecording, read, recording_of, segment
 from trihedron.api.referring import AnyReference, motion_of
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
+from trihedron.estimate.filter_noise.findings import noticed, too_sure, unlike_this_log
 from trihedron.estimate.filter_noise.static_intervals import (
     between_intervals,
     static_noise,

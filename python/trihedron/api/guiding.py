@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.api.calibrating import calibrate
-from trihedron.api.planning_poses import best_next, is_determined, planned, poses_needed, sigma_of
 from trihedron.api.reading import segment
 from trihedron.api.verifying import own_calibration, verify
 from trihedron.arrays import XYZ, FloatArray, sigmas_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.accelerometer.poses import ENTRIES, parameter_names, pose_in_words
+from trihedron.estimate.next_pose import best_next, is_determined, planned, poses_needed, sigma_of
 from trihedron.records import Calibration, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
 from trihedron.records.results import CalibrationResult, VerificationResult

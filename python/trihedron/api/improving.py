@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.api.driving import SCATTER, MovedAlike, bias_scatter, flicker_of_poses
-from trihedron.api.noise_from_poses import noise_from_poses
 from trihedron.arrays import AXES, FloatArray
+from trihedron.comparison.driving import SCATTER, MovedAlike, bias_scatter, flicker_of_poses
 from trihedron.comparison.fitted import model_of_diagnosis
 from trihedron.comparison.frames import AIMED_AT
 from trihedron.comparison.noise import Sampled, sampled
@@ -26,6 +25,7 @@ from trihedron.simulate import (
     Drift,
     Scenario,
     diagnosed_sizes,
+    noise_from_poses,
     read_scenario,
     scenario_from_table,
 )

@@ -10,7 +10,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
-from trihedron.estimate.gyroscope.turn_design import PlannedMove, design_moves, design_turns
+from trihedron.estimate.gyroscope.turn_design import design_moves, design_turns
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
@@ -116,23 +116,15 @@ def _poses(name: str, up: FloatArray, sigma: float, gravity_m_s2: float) -> Pose
 
 
 def _moves(angle_noise: float) -> tuple[MovePlan, ...]:
-    e = np.eye(3)
-    quarter, eighth = 0.5 * math.pi, 0.25 * math.pi
-    third = [e[2], e[0], e[1]]
-    single = [PlannedMove(third[k], e[k], quarter) for k in range(3)]
-    halves = [
-        part
-        for k in range(3)
-        for part in (
-            PlannedMove(third[k], e[k], eighth),
-            PlannedMove(math.cos(eighth) * third[k] + math.sin(eighth) * np.cross(third[k], e[k]), e[k], eighth),
-        )
-    ]
-    back = [
-        *single,
-        *(PlannedMove(np.cross(third[k], e[k]), e[k], -quarter) for k in range(3)),
-    ]
-    both = [*back, *(PlannedMove(np.cross(e[k], third[k]), e[k], quarter) for k in range(3))]
+    axes = np.eye(3)
+    quarter, eighth = 0.5 * math.pi * axes, 0.25 * math.pi * axes
+    up = np.roll(axes, 1, axis=0)
+    aside = np.cross(up, axes)
+    half_way = math.sqrt(0.5) * (up + aside)
+    single = list(zip(up, quarter, strict=True))
+    halves = [*zip(up, eighth, strict=True), *zip(half_way, eighth, strict=True)]
+    back = [*single, *zip(aside, -quarter, strict=True)]
+    both = [*back, *zip(-aside, quarter, strict=True)]
     sets = (
         ("three quarter turns about level axes", single),
         ("the same, each with a stop half way", halves),

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from trihedron.api.applying import AnyCalibration, calibration_of, check_units
-from trihedron.api.noise_from_poses import noise_from_poses
 from trihedron.api.reading import AnyRecording, recording_of
 from trihedron.estimate.noise.poses import noise_of_poses
 from trihedron.records import Calibration, Recording, Segments, Truth
@@ -21,6 +20,7 @@ from trihedron.simulate import (
     Scenario,
     Smoother,
     list_scenarios,
+    noise_from_poses,
     read_scenario,
     scenario_by_name,
     twin_scenario,

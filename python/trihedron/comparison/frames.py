@@ -23,7 +23,7 @@ from trihedron.transforms import directions_of
 from trihedron.units import rate_to_si
 
 if TYPE_CHECKING:
-    from trihedron.api.driving import MovedAlike
+    from trihedron.comparison.driving import MovedAlike
 
 AIMED_AT = (0.9, 1.1)
 """Ratio of the gravity errors in poses and moves, simulation over recording, within which the two are alike."""

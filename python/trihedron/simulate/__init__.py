@@ -6,6 +6,7 @@ from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion.steps import Disturb, Motion, MoveTo, Oscillate, Pose, Turn, Vibrate
 from trihedron.simulate.named import list_scenarios, scenario_by_name
 from trihedron.simulate.noise import NoiseTerms, make_noise
+from trihedron.simulate.pose_noise import noise_from_poses
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.readout import Drift, Smoother
 from trihedron.simulate.run import simulate

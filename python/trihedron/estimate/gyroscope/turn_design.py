@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.records.plan import TurnPlan
-from trihedron.transforms import cross_matrix
+from trihedron.transforms import cross_matrix, rotation_by
 
 
 def design_turns(
@@ -45,36 +44,38 @@ def design_turns(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedMove:
-    """A rotation by ``angle_rad`` about ``axis`` (3,), from the pose in which ``up`` (3,) is vertical; body frame."""
-
-    up: FloatArray
-    axis: FloatArray
-    angle_rad: float
+Move = tuple[FloatArray, FloatArray]
+"""Direction of "up" (3,) before a move, and its rotation vector (3,) [rad], both in the body frame."""
 
 
-def design_moves(moves: Sequence[PlannedMove], sigma_rad: float) -> tuple[int, float]:
+def design_moves(moves: Sequence[Move], sigma_rad: float) -> tuple[int, float]:
     """Rank of the nine elements of ``S_ω`` by planned moves, and the largest relative standard uncertainty of one.
 
-    A rate error ``δS n θ'`` rotates the body by ``ε = A(θ) δS n``, ``A = ∫₀^θ exp(-[n]× s) ds =
-    θ n nᵀ + sin θ (1 - n nᵀ) - (1 - cos θ) [n]×``; the tilt error after the move is ``u × ε``, two components of noise
-    ``sigma_rad`` each (5.7). Three turns about horizontal axes determine six elements; nine need a stop in each turn.
+    The tilt error after a move has two components of noise ``sigma_rad`` each (5.7). Three turns about horizontal axes
+    determine six elements; nine need a stop in each turn.
     """
-    rows = []
-    for move in moves:
-        n, angle = move.axis / np.linalg.norm(move.axis), move.angle_rad
-        cross = cross_matrix(n)
-        along = np.outer(n, n)
-        gain = angle * along + math.sin(angle) * (np.eye(3) - along) - (1.0 - math.cos(angle)) * cross
-        # A room-fixed vector rotates by -θ in the body frame.
-        turned = along + math.cos(angle) * (np.eye(3) - along) - math.sin(angle) * cross
-        up = turned @ (move.up / np.linalg.norm(move.up))
-        rows.append(np.kron(cross_matrix(up) @ gain, n[None, :]))
-    matrix = np.concatenate(rows) / sigma_rad
-    singular, directions = np.linalg.svd(matrix)[1:]
+    # A room-fixed vector rotates by the opposite angle in the body frame.
+    rows = [rows_of_move(turn[None], rotation_by(turn).T @ up) for up, turn in moves]
+    singular, directions = np.linalg.svd(np.concatenate(rows) / sigma_rad)[1:]
     rank = int(np.sum(singular > 1e-9 * singular[0]))
     if rank < 9:
         return rank, math.inf
     covariance = (directions[:9].T / singular[:9] ** 2) @ directions[:9]
     return rank, math.sqrt(float(np.max(np.diag(covariance))))
+
+
+def rows_of_move(path: FloatArray, up_after: FloatArray) -> FloatArray:
+    """(3, 9) derivative of the tilt after a move [rad] by the gyro's relative errors, row by row.
+
+    Of each part of the path (k, 3), a rotation ``θ n``, a rate error ``E n θ'`` rotates the body by ``A(θ) E n``,
+    ``A = ∫₀^θ exp(-[n]× s) ds = θ n nᵀ + sin θ (1 - n nᵀ) - (1 - cos θ) [n]×``; the tilt error is ``u × ε``.
+    """
+    rotation, total = np.eye(3), np.zeros((3, 9))
+    for part in path[::-1]:
+        angle = float(np.linalg.norm(part))
+        n = part / (angle or 1.0)
+        along = np.outer(n, n)
+        gain = angle * along + math.sin(angle) * (np.eye(3) - along) - (1.0 - math.cos(angle)) * cross_matrix(n)
+        total += np.kron(rotation @ gain, n)
+        rotation = rotation @ rotation_by(part).T
+    return cross_matrix(up_after) @ total

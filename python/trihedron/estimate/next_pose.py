@@ -8,8 +8,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import CANDIDATES, design_rows
+from trihedron.estimate.gyroscope.turn_design import rows_of_move
 from trihedron.records import Calibration, Move, Recording, Segments
-from trihedron.transforms import rotation_by
 from trihedron.units import rate_to_si
 
 NEAR = 0.9
@@ -48,31 +48,14 @@ def path_of(recording: Recording, segments: Segments, S: FloatArray | None, move
     return np.array([piece.sum(axis=0) for piece in pieces])
 
 
-def shortest_path(start: FloatArray, stop: FloatArray, n: int = 30) -> FloatArray:
-    """(n, 3) rotation vectors of the body that move up from ``start`` to ``stop``, both (3,) in the body."""
+def shortest_path(start: FloatArray, stop: FloatArray) -> FloatArray:
+    """(1, 3) rotation vector of the body that moves up from ``start`` to ``stop``, both (3,) in the body."""
     # In the body, up rotates opposite to the body's own rotation.
     axis = np.cross(stop, start)
-    size = float(np.linalg.norm(axis))
-    if size < 1e-9:
-        helper = np.eye(3)[int(np.argmin(np.abs(start)))]
-        axis = np.cross(start, helper)
-        size = float(np.linalg.norm(axis))
+    if np.linalg.norm(axis) < 1e-9:
+        axis = np.cross(start, np.eye(3)[int(np.argmin(np.abs(start)))])
     angle = float(np.arccos(np.clip(start @ stop, -1.0, 1.0)))
-    return np.tile(axis / size * angle / n, (n, 1))
-
-
-def move_rows(path: FloatArray, up_after: FloatArray) -> FloatArray:
-    """(2, 9) derivative of the predicted vertical after a move [rad] by the gyro's relative errors, row by row.
-
-    A relative error E of the gyro (δω = E ω) rotates the attitude by Σ R E ω dt, R from the instant to the end.
-    """
-    rotation = np.eye(3)
-    total = np.zeros((3, 9))
-    for step in path[::-1]:
-        total += np.einsum("ai,k->aik", rotation, step).reshape(3, 9)
-        rotation = rotation @ rotation_by(step).T
-    across = np.linalg.svd(up_after[None, :])[2][1:]
-    return across @ total
+    return np.atleast_2d(axis * (angle / np.linalg.norm(axis)))
 
 
 def sigma_of(known: Known) -> FloatArray:
@@ -85,7 +68,7 @@ def _with_pose(known: Known, direction: FloatArray) -> Known:
     accelerometer = _updated(known.accelerometer, row[None, :], known.pose_sigma)
     gyroscope = known.gyroscope
     if gyroscope is not None and len(known.up):
-        rows = move_rows(shortest_path(known.up[-1], direction), direction)
+        rows = rows_of_move(shortest_path(known.up[-1], direction), direction)
         gyroscope = _updated(gyroscope, rows, known.move_sigma)
     up = np.vstack([known.up, direction[None, :]])
     return Known(up, accelerometer, gyroscope, known.pose_sigma, known.move_sigma)
@@ -166,7 +149,7 @@ def planned(
     for move in segments.moves:
         path = path_of(recording, segments, S, move)
         path = shortest_path(up[move.pose_before], up[move.pose_after]) if path is None else path
-        design = move_rows(path, up[move.pose_after]) / sigma
+        design = rows_of_move(path, up[move.pose_after]) / sigma
         information += design.T @ design
     gyroscope: FloatArray = np.asarray(np.linalg.inv(information), dtype=np.float64)
     return Known(up, accelerometer, gyroscope, pose, sigma)

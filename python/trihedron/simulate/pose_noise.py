@@ -6,7 +6,9 @@ import numpy as np
 
 from trihedron.channel_facts.low_pass import gain_of
 from trihedron.records.pose_noise import PoseNoise
-from trihedron.simulate import NoiseTerms, Smoother, low_pass_like, noise_of_octaves
+from trihedron.simulate.noise import NoiseTerms
+from trihedron.simulate.readout import Smoother
+from trihedron.simulate.twin_noise import low_pass_like, noise_of_octaves
 
 FEWEST_OCTAVES = 4
 N_FREQUENCIES = 256
