@@ -92,7 +92,6 @@ if TYPE_CHECKING:
     from trihedron.records.results import SessionsResult as SessionsResult
     from trihedron.records.results import VerificationResult as VerificationResult
     from trihedron.records.truth import Truth as Truth
-    from trihedron.report.presenting import plot as plot
     from trihedron.report.presenting import report as report
 
     __version__: str
@@ -128,7 +127,7 @@ _PUBLIC = {
     "records.diagnosis": "Diagnosis",
     "records.results": "CalibrationResult CheckResult DiagnosisResult KalmanResult SessionsResult VerificationResult",
     "records.truth": "Truth",
-    "report.presenting": "plot report",
+    "report.presenting": "report",
 }
 _HOME = {name: f"trihedron.{module}" for module, names in _PUBLIC.items() for name in names.split()}
 """The module of each public name."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,22 +14,9 @@ from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 from trihedron.estimate.reference import fit_references, turns_of_frame
 from trihedron.estimate.verification import reference_findings
-from trihedron.records import Calibration, Frame
+from trihedron.records import Frame
 from trihedron.records.reference import AgainstReference, FitToReference
-
-
-@dataclass(frozen=True, eq=False)
-class ReferencesResult:
-    """The unit's ``calibration``; ``references`` are the fits to each recording: bias, clock, error."""
-
-    calibration: Calibration
-    references: tuple[AgainstReference, ...]
-
-    def __str__(self) -> str:
-        from trihedron.report.reference import references_report
-        from trihedron.report.text import to_text
-
-        return to_text(references_report(self.calibration, self.references))
+from trihedron.records.results import ReferencesResult
 
 
 def calibrate_references(

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from trihedron.cli.options import LogSource, progress, with_options
-from trihedron.cli.output import FullResults, is_stdout, leave, say
+from trihedron.cli.output import FIRST_SCREEN, FullResults, say
 from trihedron.files.output import write_whole
 
 if TYPE_CHECKING:
     from trihedron.records import Noise
 
-FIRST_SCREEN = 2
 OPTIONS = {
     "gyro_lsb": ("SIZE", "Size of the gyro's count, as in '0.05 deg/s'."),
     "accel_lsb": ("SIZE", "Size of the accelerometer's count, as in '3.33 mg'."),
@@ -76,8 +75,8 @@ def allan(
         write_whole(plot, png_of(noise_picture(found)), overwrite=results.force)
         say(f"plot: {plot}")
     more = "Data-sheet units, how long to record, Kalibr's names: --full; curves: --plot F.png or --report F.html."
-    results.finish(document, lambda: noise_record(found, lengths, accuracy / 100.0), more)
-    leave(all_findings(found), is_shown=not is_stdout(results.json))
+    results.write(document, lambda: noise_record(found, lengths, accuracy / 100.0), more)
+    results.leave(all_findings(found))
 
 
 def _of_log(source: LogSource, calibration: Path | None, options: dict[str, Any]) -> Noise:

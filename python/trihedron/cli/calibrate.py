@@ -1,11 +1,12 @@
 """``trihedron calibrate``."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.cli.calibrate_sessions import calibrate_beside, calibrate_many
 from trihedron.cli.options import (
     GravitySource,
     LogsSource,
@@ -16,10 +17,12 @@ from trihedron.cli.options import (
     whole_numbers,
     with_options,
 )
-from trihedron.cli.output import FullResults
+from trihedron.cli.output import FIRST_SCREEN, FullResults
 from trihedron.cli.streamed import calibrate_stream
 
-FIRST_SCREEN = 2
+if TYPE_CHECKING:
+    from trihedron.records.results import ReferencesResult, SessionsResult
+
 OPTIONS = {
     "method": ("NAME", "joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces."),
     "frame": (
@@ -83,7 +86,8 @@ def calibrate(
         choices |= {"turntable_deg_s": numbers("--turntable", turntable), "turntable_sigma": turntable_error / 100.0}
     if sources.are_many(by):
         if reference:
-            calibrate_beside(sources, reference, reference_columns, place, choices["frame"], output, results)
+            beside = _beside(sources, reference, reference_columns, choices["frame"], place)
+            results.emit(beside, "Bias over time: --json FILE.", output=output)
             return
         if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "frame"}:
             raise typer.BadParameter(
@@ -92,7 +96,9 @@ def calibrate(
             )
         if method != "joint":
             raise typer.BadParameter("several logs are calibrated with --method joint")
-        calibrate_many(sources, place, by, labels, choices["frame"], output, results)
+        together = _together(sources, by or "session", labels, choices["frame"], place)
+        more = "What changed and every recording: --full, or --report FILE.html with figures."
+        results.emit(together, more, output=output)
         return
     choices["gyroscope_nominal"] = gyro_nominal
     if stream and extended:
@@ -104,17 +110,8 @@ def calibrate(
     else:
         choices |= {"reference": _only(reference), "reference_columns": reference_columns}
         result = _calibrated(sources, place, choices, extended=extended)
-    from trihedron.report.extended import calibration_result_report
-    from trihedron.report.machine import calibration_record
-
-    document = calibration_result_report(result)
     more = "Every pose and move: --full, or --report FILE.html with figures."
-
-    def machine() -> dict[str, Any]:
-        return calibration_record(result.calibration, result.segments, result.recording)
-
-    sections = FIRST_SCREEN + (result.reference is not None)
-    results.emit_calibration(document, machine, result.calibration, output, sections, more)
+    results.emit(result, more, sections=FIRST_SCREEN + (result.reference is not None), output=output)
 
 
 def _calibrated(sources: LogsSource, place: GravitySource, choices: dict[str, Any], *, extended: bool) -> Any:
@@ -134,3 +131,30 @@ def _only(references: list[Path] | None) -> Path | None:
     if references and len(references) > 1:
         raise typer.BadParameter(f"{len(references)} references are for as many logs, not for one")
     return references[0] if references else None
+
+
+def _beside(
+    sources: LogsSource, references: list[Path], columns: str | None, frame: Any, place: GravitySource
+) -> ReferencesResult:
+    """One unit calibrated from several logs with a reference each."""
+    given = sources.each()
+    if len(given) != len(references):
+        raise typer.BadParameter(f"{len(given)} logs need as many references, not {len(references)}")
+    from trihedron.api.references import calibrate_references
+
+    with progress("calibrating"):
+        logs = [source.read() for source in given]
+        return calibrate_references(logs, references, reference_columns=columns, frame=frame, **place.said)
+
+
+def _together(sources: LogsSource, by: str, labels: str | None, frame: Any, place: GravitySource) -> SessionsResult:
+    """Every log calibrated, and common parameters with their repeatability."""
+    how: Any = one_of("--by", by, ("session", "date", "temperature"))
+    words = None if labels is None else [word.strip() for word in labels.split(",")]
+    from trihedron.api.sessions import calibrate_sessions
+
+    with progress("calibrating") as notify:
+        # An unreadable log stops the command, unlike a recording that cannot be calibrated.
+        logs = [source.read() for source in sources.each()]
+        said = place.said | {"frame": frame or "lower", "progress": notify}
+        return calibrate_sessions(logs, by=how, labels=words, **said)

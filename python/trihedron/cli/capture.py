@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, with_options
+from trihedron.cli.output import say
 from trihedron.defaults import ACCURACY
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def capture(
 
     check_free([output, calibration], overwrite=force, inputs=[Path(port)])
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
-    _say(f"{source.name}: {found.protocol}. Recording to {output}; Ctrl-C stops.")
+    say(f"{source.name}: {found.protocol}. Recording to {output}; Ctrl-C stops.")
     recorder = recorder_of(source, found, output, overwrite=force, rate_hz=rate, wait_for_return_s=wait)
     if not guide:
         record(recorder, output, seconds)
@@ -110,7 +111,9 @@ def full_disk_is_status_2() -> Iterator[None]:
     try:
         yield
     except DiskError as error:
-        _say(f"\ntrihedron: {error}" if sys.stderr.isatty() else f"trihedron: {error}")
+        if sys.stderr.isatty():
+            typer.echo(err=True)  # below the progress line
+        say(f"trihedron: {error}")
         raise typer.Exit(2 if error.rows_saved else 1) from None
 
 
@@ -123,10 +126,10 @@ def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = 
     if recorder.clock is not None:
         typer.echo(f"clocks: {recorder.clock_text().replace(' / ', ', ')}")
     if recorder.ended_because and not is_ended_well:
-        _say(f"trihedron: {recorder.ended_because}; what came before is saved in {output}.")
+        say(f"trihedron: {recorder.ended_because}; what came before is saved in {output}.")
         raise typer.Exit(2)
     if count.lost > SERIOUS_LOSS * (n + count.lost):
-        _say(f"trihedron: {count.lost} of {n + count.lost} frames were lost; check cable, baud rate and the board.")
+        say(f"trihedron: {count.lost} of {n + count.lost} frames were lost; check cable, baud rate and the board.")
         raise typer.Exit(2)
 
 
@@ -150,7 +153,7 @@ class Progress:
         for remark in block.remarks:
             if "lost" not in remark:
                 self.clear()
-                _say(remark)
+                say(remark)
         if self._is_terminal and self.elapsed_s - self._said_s >= SAY_EVERY_S:
             self._said_s = self.elapsed_s
             rate = self.n / max(self.elapsed_s, 1e-9)
@@ -163,7 +166,3 @@ class Progress:
         if self._is_terminal and self._said_s > 0.0:
             sys.stderr.write("\r" + " " * 70 + "\r")
             sys.stderr.flush()
-
-
-def _say(sentence: str) -> None:
-    typer.echo(sentence, err=True)

@@ -94,7 +94,6 @@ def diagnose(
 def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, results: FullResults) -> None:
     """Diagnose every log alone, and the effects that all share."""
     from trihedron.api import diagnosing_sessions
-    from trihedron.report.shared_diagnosis import shared_diagnosis_record, shared_diagnosis_report
 
     given = sources.each()
     recordings = [source.read() for source in given]
@@ -102,7 +101,7 @@ def _diagnose_many(sources: LogsSource, place: GravitySource, alpha: float, resu
         found = diagnosing_sessions.diagnose_sessions(recordings, **place.said, alpha=alpha, progress=notify)
     if found.effects:
         name_log(given[found.effects[0].surest])
-    results.emit(shared_diagnosis_report(found), lambda: shared_diagnosis_record(found))
+    results.emit(found, sections=None)
 
 
 def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:

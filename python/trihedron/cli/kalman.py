@@ -1,13 +1,11 @@
 """``trihedron kalman``."""
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from trihedron.cli.options import GravitySource, LogSource, one_of, progress, with_options
 from trihedron.cli.output import FullResults
 
-FIRST_SCREEN = 3
 OPTIONS = {
     "reference": (
         "FILE",
@@ -41,13 +39,9 @@ def kalman(
     results.check(output, inputs=(*source.files, reference, noise))
     recording = source.read()
     from trihedron.api import filtering
-    from trihedron.report.kalman import kalman_record, kalman_report
 
     with progress("filtering") as notify:
         result = filtering.kalman(
             recording, reference, sigma_angle_deg=angle_sigma, **options, **place.said, progress=notify
         )
-    document = kalman_report(result.outcome, result.calibration)
-    machine = partial(kalman_record, result.outcome, result.calibration)
-    more = "Every pose: --full; convergence and innovations drawn: --report FILE.html."
-    results.emit_calibration(document, machine, result.calibration, output, FIRST_SCREEN, more)
+    results.emit(result, "Every pose: --full; innovations drawn: --report FILE.html.", sections=3, output=output)

@@ -4,10 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from trihedron.cli.options import GravitySource, LogSource, numbers, progress, with_options
-from trihedron.cli.output import FullResults, is_stdout, leave, put, say
+from trihedron.cli.output import FIRST_SCREEN, FullResults, put, say
 from trihedron.files.output import write_whole
 
-FIRST_SCREEN = 2
 OPTIONS = {
     "static": ("STATIC", "Static log of the unit, or JSON of trihedron allan; default: poses of 20 s in the log."),
     "reference": ("MOTION", "Known motion beside the log: attitude, or pose."),
@@ -66,5 +65,5 @@ def noise(
             write_whole(output, text, overwrite=results.force)
             say(f"noise for {to}: {output}")
     more = "The test on the other half: --full; with the picture: --report FILE.html."
-    results.finish(document, lambda: filter_noise_record(found), more)
-    leave(found.findings, is_shown=not is_stdout(results.json))
+    results.write(document, lambda: filter_noise_record(found), more)
+    results.leave(found.findings)

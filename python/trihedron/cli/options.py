@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -144,13 +145,10 @@ class LogsSource(ReadingOptions):
             raise typer.BadParameter(
                 f"--accel was given {len(accel)} times and --gyro {len(gyro)} times: they go in pairs"
             )
-        if len(log) <= 1 and max(len(accel), len(gyro)) <= 1:
-            only = {name: next(iter(files), None) for name, files in (("log", log), ("accel", accel), ("gyro", gyro))}
-            return [LogSource(**rest | only)]
-        pairs = [
-            LogSource(**rest, accel=accel[k] if accel else None, gyro=gyro[k] if gyro else None)
-            for k in range(max(len(accel), len(gyro)))
-        ]
+        if not self.are_many():
+            one, of_accel, of_gyro = (next(iter(files), None) for files in (log, accel, gyro))
+            return [LogSource(**rest, log=one, accel=of_accel, gyro=of_gyro)]
+        pairs = [LogSource(**rest, accel=a, gyro=g) for a, g in zip_longest(accel, gyro)]
         return [*(LogSource(**rest, log=path) for path in log), *pairs]
 
 
@@ -261,7 +259,7 @@ def signs(option: str, text: str) -> list[int]:
 
 @contextmanager
 def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on stderr with rate and time left, after ``after_s`` seconds; none in a pipe."""
+    """A progress bar on stderr with the time left, after ``after_s`` seconds; none in a pipe."""
     began = time.monotonic()
     bar: Any = None
     handle: Any = None
@@ -286,14 +284,9 @@ def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str],
 
 
 def _bar() -> Any:
-    """Columns of the bar: task, fraction done, rate, time left."""
+    """Columns of the bar: task, fraction done, time left."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
-    from rich.text import Text
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    class Rate(ProgressColumn):
-        def render(self, task: Any) -> Text:
-            return Text("" if not task.speed else f"{task.speed:.3g} %/s", style="dim")
-
-    columns = (TextColumn("{task.description}"), BarColumn(None), TaskProgressColumn(), Rate(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(None), TaskProgressColumn(), TimeRemainingColumn())
     return Progress(*columns, console=Console(stderr=True), transient=True, expand=True)

@@ -19,11 +19,13 @@ from trihedron.files.output import check_free, check_report, write_whole
 from trihedron.sanitise import escaped
 
 if TYPE_CHECKING:
-    from trihedron.records import Calibration, Finding
+    from trihedron.records import Finding
     from trihedron.report.document import Document
     from trihedron.report.text import Style
 
 NOT_TO_BE_TRUSTED = 2
+FIRST_SCREEN = 2
+"""Sections of a report that are printed without ``--full``."""
 
 
 def check_outputs(
@@ -88,15 +90,42 @@ class Results:
         """As :func:`check_outputs`, with ``more`` files that the command writes."""
         check_outputs(*more, self.json, force=self.force, report=self.report, inputs=inputs)
 
-    def emit(self, document: Document, machine: Machine) -> None:
-        """Print the report on stdout; write JSON and report where requested."""
-        show(document, self.json, sections=None)
-        self.write(document, machine)
+    @property
+    def shows_all(self) -> bool:
+        """Whether the whole report is printed."""
+        return True
 
-    def write(self, document: Document, machine: Machine) -> None:
-        """Write report and JSON where requested."""
+    def emit(
+        self, result: Any, more: str = "", *, sections: int | None = FIRST_SCREEN, output: Path | None = None
+    ) -> None:
+        """Print the report of a result and write what is requested, its calibration to ``output``; status 2 where one
+        of its findings is serious."""
+        from trihedron.report.presenting import as_dict, document_of
+
+        document = document_of(result)
+        self.show(document, sections)
+        if output is not None:
+            from trihedron.files.calibration import write_calibration
+
+            write_calibration(result.calibration, output, overwrite=self.force)
+            say(f"calibration: {output}")
+        self.write(document, lambda: as_dict(result), more)
+        self.leave(getattr(result, "findings", ()))
+
+    def show(self, document: Document, sections: int | None = None) -> None:
+        """Print the first ``sections`` of a report, or all."""
+        show(document, self.json, sections=None if self.shows_all else sections)
+
+    def write(self, document: Document, machine: Machine, more: str = "") -> None:
+        """Write report and JSON where requested; say ``more``, where more is found, unless all was shown."""
         write_report(document, machine, self.report, force=self.force)
         write_json(machine, self.json, force=self.force, document=document)
+        if more and not self.shows_all and self.report is None:
+            say(more)
+
+    def leave(self, findings: Iterable[Finding]) -> None:
+        """As :func:`leave`, where the report was printed unless stdout is for JSON."""
+        leave(findings, is_shown=not is_stdout(self.json))
 
 
 @dataclass(frozen=True)
@@ -105,34 +134,10 @@ class FullResults(Results):
 
     full: bool = False
 
-    def show(self, document: Document, sections: int | None) -> None:
-        """Print the first ``sections``, or with ``--full`` all."""
-        show(document, self.json, sections=None if self.full else sections)
-
-    def finish(self, document: Document, machine: Machine, more: str) -> None:
-        """Write report and JSON where requested; say ``more``, where more is found, unless all was shown."""
-        self.write(document, machine)
-        if not self.full and self.report is None:
-            say(more)
-
-    def emit_calibration(
-        self,
-        document: Document,
-        machine: Machine,
-        calibration: Calibration,
-        output: Path | None,
-        sections: int,
-        more: str,
-    ) -> None:
-        """Print the report of a calibration, write what is requested; status 2 where it is not to be trusted."""
-        from trihedron.files.calibration import write_calibration
-
-        self.show(document, sections)
-        if output is not None:
-            write_calibration(calibration, output, overwrite=self.force)
-            say(f"calibration: {output}")
-        self.finish(document, machine, more)
-        leave(calibration.findings, is_shown=not is_stdout(self.json))
+    @property
+    def shows_all(self) -> bool:
+        """Whether the whole report is printed."""
+        return self.full
 
 
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:

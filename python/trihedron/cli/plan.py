@@ -26,11 +26,8 @@ def plan(
 ) -> None:
     """Before an experiment: expected uncertainties from turns, poses and moves, and which of them matter most."""
     results.check()
-    from dataclasses import asdict
-
     from trihedron import units
     from trihedron.api.planning import plan as make_plan
-    from trihedron.report.plan import plan_report
 
     planned = make_plan(
         turns_deg=numbers("--turns", turns),
@@ -40,4 +37,4 @@ def plan(
         accelerometer_density=units.m_s2_from_micro_g(accel_noise),
         sigma_turn_rad=units.radians_from_degrees(turn_error),
     )
-    results.emit(plan_report(planned), lambda: asdict(planned))
+    results.emit(planned)

@@ -26,5 +26,7 @@ def segment(source: LogSource, *, stream: bool = False, results: Results) -> Non
 
         with progress("segmenting") as notify:
             segments = reading.segment(recording, progress=notify)
-    results.emit(segments_report(segments, recording), lambda: segments_record(segments, recording))
+    document = segments_report(segments, recording)
+    results.show(document)
+    results.write(document, lambda: segments_record(segments, recording))
     leave((*recording.findings, *segments.findings))

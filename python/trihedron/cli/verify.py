@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress, with_options
-from trihedron.cli.output import NOT_TO_BE_TRUSTED, FullResults, is_stdout, leave
+from trihedron.cli.output import NOT_TO_BE_TRUSTED, FullResults
 from trihedron.cli.run import note_file
 from trihedron.errors import InputError
 
 if TYPE_CHECKING:
     from trihedron.records import Calibration
-
-FIRST_SCREEN = 2
-
 
 OPTIONS = {
     "log": typer.Argument(
@@ -45,8 +42,6 @@ def verify(
     """
     results.check(inputs=source.files)
     from trihedron.api import ranking, verifying
-    from trihedron.report.machine import verification_record
-    from trihedron.report.ranking import ranking_record, ranking_report
 
     paths, log = _parted(source)
     known = _calibrations(paths)
@@ -55,25 +50,17 @@ def verify(
     if len(known) > 1:
         with progress("ranking") as notify:
             found = ranking.rank(paths, recording, progress=notify, **place.said)
-        document = ranking_report(found)
         note_file(next(path for path in paths if path.name == found.best.name))
-        results.show(document, FIRST_SCREEN)
-        results.write(document, lambda: ranking_record(found))
-        leave(found.best.verification.findings, is_shown=not is_stdout(results.json))
+        results.emit(found)
+        results.leave(found.best.verification.findings)
         if found.best.is_rejected:
             raise typer.Exit(NOT_TO_BE_TRUSTED)
         return
-    from trihedron.report.verification import verification_report
-
     with progress("verifying") as notify:
         result = verifying.verify(
             known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=notify, **place.said
         )
-    document = verification_report(result.verification, result.segments, recording)
-    results.show(document, FIRST_SCREEN)
-    more = "Every pose and move: --full, or --report FILE.html with figures."
-    results.finish(document, lambda: verification_record(result.verification), more)
-    leave(result.findings, is_shown=not is_stdout(results.json))
+    results.emit(result, "Every pose and move: --full, or --report FILE.html with figures.")
 
 
 def _parted(source: LogsSource) -> tuple[list[Path], LogSource]:

@@ -240,6 +240,19 @@ class KalmanResult(Judged, Printed):
         return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"
 
 
+@dataclass(frozen=True, eq=False)
+class ReferencesResult(Judged, Printed):
+    """The unit's ``calibration``; ``references`` are the fits to each recording: bias, clock, error."""
+
+    calibration: Calibration
+    references: tuple[AgainstReference, ...]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings on all recordings together."""
+        return self.calibration.findings
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SessionsResult(Judged, Printed):
     """Many recordings as one model, with each recording's own calibration. ``print`` gives the report.

@@ -22,6 +22,7 @@ from trihedron.records.results import (
     CheckResult,
     DiagnosisResult,
     KalmanResult,
+    ReferencesResult,
     SessionsResult,
     VerificationResult,
 )
@@ -35,9 +36,9 @@ from trihedron.report.filter_noise import filter_noise_columns, filter_noise_rec
 from trihedron.report.kalman import kalman_record, kalman_report
 from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import noise_record
-from trihedron.report.page import to_fragment
 from trihedron.report.plan import plan_report
 from trihedron.report.ranking import ranking_record, ranking_report
+from trihedron.report.reference import references_report
 from trihedron.report.saved import written
 from trihedron.report.segments import recording_summary, segments_report
 from trihedron.report.sessions import sessions_report
@@ -85,6 +86,11 @@ _KINDS: dict[type, _Shown] = {
         lambda r: machine.sessions_record(r.model),
         lambda r: frames.sessions_columns(r.model),
     ),
+    ReferencesResult: _Shown(
+        lambda r: references_report(r.calibration, r.references),
+        lambda r: {**calibration_document(r.calibration), "references": [one.to_dict() for one in r.references]},
+        lambda r: frames.calibration_columns(r.calibration),
+    ),
     SharedDiagnosis: _Shown(shared_diagnosis_report, shared_diagnosis_record),
     Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),
     Ranking: _Shown(ranking_report, ranking_record),
@@ -105,6 +111,12 @@ def _kind(result: object) -> _Shown:
     raise TypeError(f"{type(result).__name__} is no result of trihedron; there are {names}.")
 
 
+def document_of(result: object) -> document.Document:
+    """The report of a result, laid out."""
+    made: document.Document = _kind(result).document(result)
+    return made
+
+
 def as_dict(result: object) -> dict[str, Any]:
     """See :meth:`trihedron.records.presented.Presented.to_dict`."""
     made: dict[str, Any] = plain(_kind(result).record(result))
@@ -123,7 +135,7 @@ def _width() -> int:
 
 def as_text(result: object) -> str:
     """The report of a result as plain text."""
-    return to_text(_kind(result).document(result), width=_width())
+    return to_text(document_of(result), width=_width())
 
 
 def as_screen(result: DiagnosisResult) -> str:
@@ -133,43 +145,21 @@ def as_screen(result: DiagnosisResult) -> str:
 
 def as_html(result: object) -> str:
     """The first screen of the report as HTML, for a notebook."""
-    return to_fragment(_kind(result).document(result))
+    # Imported here: its templates are slow to load.
+    from trihedron.report.page import to_fragment
+
+    return to_fragment(document_of(result))
 
 
 def pictures(result: object) -> dict[str, document.Picture]:
     """The figures of a result's report by name."""
-    laid_out = _kind(result).document(result)
+    laid_out = document_of(result)
     every = [laid_out.lead, *(block for section in laid_out.sections for block in section.blocks)]
     return {b.name: b for b in every if isinstance(b, document.Picture)}
 
 
 def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
-    """A figure of a result's report: the first, or the one of that name; a notebook shows it, ``savefig`` writes it.
-
-    Parameters
-    ----------
-    result : a result of trihedron
-        Of any function but ``demo``.
-    name : str, optional
-        Which figure; the error for a wrong name lists the figures.
-    ax : matplotlib Axes, or one for each panel
-        Where to draw; a new figure when not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    TypeError
-        When ``result`` is not a result.
-    ValueError
-        When there is no such figure, it has another number of panels, or matplotlib is not installed.
-
-    Examples
-    --------
-    >>> trihedron.plot(result, "residuals").savefig("residuals.png")
-    """
+    """See :meth:`trihedron.records.presented.Presented.plot`."""
     there = pictures(result)
     chosen = next(iter(there), None) if name is None else name
     if chosen is None or chosen not in there:
