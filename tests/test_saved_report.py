@@ -19,7 +19,7 @@ from trihedron.errors import InputError
 from trihedron.records import Finding, Severity
 from trihedron.records.domains import DOMAINS
 from trihedron.report.calibration_charts import uncalibrated_error
-from trihedron.report.chart import Bars, Chart, Disc, Level, Line, Note, Panel, Points, Scale, Span
+from trihedron.report.chart import Bars, Chart, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawn import _path
@@ -42,10 +42,10 @@ def chart():
     x, y = np.array([1.0, 2.0, 3.0]), np.array([0.5, np.nan, -1.25])
     marks = (
         Line(x, y, "a line"), Points(x, y, ["a", "b", "c"], 0.1 * x, "dots", is_across=True), Span(1.0, 2.0, "span"),
-        Bars(x, y, 0.5, ["a", "b", "c"], "bars"), Level(y=0.0), Note(1.0, 0.0, "note"),
+        Bars(x, y, 0.5, ["a", "b", "c"], "bars"), Level(y=0.0),
     )  # fmt: skip
     panel = Panel(Scale("x [s]", "s", limits=(0.0, 4.0)), Scale("y", names=("one", "two")), marks)
-    return Chart((panel, Disc("up", ((0.1, -0.2, "1", "pose 1", "taken"),))))
+    return Chart((panel, replace(panel, is_map=True)))
 
 
 def document():

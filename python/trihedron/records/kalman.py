@@ -139,9 +139,8 @@ class AxisKalmanResult:
 
     ``innovation``, ``innovation_sigma`` (n,) [raw] are reading minus one-step prediction and its standard deviation;
     ``nis``, their squared ratio, is chi-square with one degree of freedom where the noise model is right and
-    ``is_settled`` (n,) (before, the diffuse prior predicts nothing). ``drift`` (n,) is the slow noise at the end of
-    each pose given the readings so far, ``smoothed_drift`` given all of them. ``batch`` holds the batch
-    solutions as ``(constants, sigma)``.
+    ``is_settled`` (n,) (before, the diffuse prior predicts nothing). ``smoothed_drift`` (n,) is the slow noise at the
+    end of each pose given all readings. ``batch`` holds the batch solutions as ``(constants, sigma)``.
     """
 
     axis: int
@@ -153,7 +152,6 @@ class AxisKalmanResult:
     innovation: FloatArray
     innovation_sigma: FloatArray
     is_settled: npt.NDArray[np.bool_]
-    drift: FloatArray
     smoothed_drift: FloatArray
     smoothed_drift_sigma: FloatArray
     consistency: Consistency

@@ -9,9 +9,9 @@ import numpy as np
 from trihedron.arrays import XYZ, BoolArray, FloatArray, sigmas_of
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.records.published import HELD_OUT, IN_SAMPLE
-from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Disc, Level, Mark, Panel, Points, Scale
+from trihedron.report.chart import MOST_OF_A_BAR, Band, Bars, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
-from trihedron.report.drawn import equal_area, said
+from trihedron.report.drawn import said
 from trihedron.report.numbers import how_many
 from trihedron.report.segments import pose_lines, signals_picture
 from trihedron.transforms import directions_of
@@ -21,10 +21,6 @@ STRONG = 0.5
 """Correlation above which a pair of parameters is listed."""
 LIMIT_SIGMAS = 3.0
 """Limit of a residual in standard errors; chance exceeds it once in 370."""
-MARK = 0.12
-"""Diameter of a pose\'s mark; the horizon has radius 1."""
-MOST_NUMBERED = 60
-"""Most poses on a disc with printed numbers; more would overlap."""
 
 
 def residual_chart(quality: FitQuality, lines: tuple[Level, ...] = ()) -> Chart:
@@ -121,27 +117,44 @@ def poses_chart(sensor: SensorCalibration, means: FloatArray, error: FloatArray 
     """Directions of "up" with the gravity ``error`` (n,) of each pose, and the most useful next poses."""
     up = directions_of(means @ sensor.S.T + sensor.b)
     advice = sensor.observability.advice if sensor.observability is not None else ()
-    wanted = [(words, direction) for words in advice if (direction := direction_in_words(words)) is not None]
-    discs = []
+    wanted = [(words, d) for words in advice if (d := direction_in_words(words)) is not None]
+    panels = []
     for sign, title in ((1.0, "+Z above the horizon"), (-1.0, "+Z below the horizon")):
-        points: list[tuple[float, float, str, str, str]] = []
-        for k, u in enumerate(up):
-            # A pose with level Z is on the rim of both discs.
-            if sign * u[2] >= -1e-2:
-                words = " ".join(f"{c:+.2f}" for c in u).replace("-", "−")
-                x, y = equal_area((u[0], u[1], u[2]))
-                # Overlapping marks hide each other's numbers: only the first of nearly equal poses has one.
-                is_covered = any(name and math.hypot(x - a, y - b) < MARK for a, b, name, *_ in points)
-                label = "" if is_covered or len(up) > MOST_NUMBERED else str(k + 1)
-                tip = f"pose {k + 1}" if error is None else said(f"pose {k + 1}", mm_s2(error)[k], "mm/s²")
-                points.append((x, y, label, f"{tip}, up {words}", "taken"))
-        # Numbered marks last: the others would cover their numbers.
-        points.sort(key=lambda point: point[2] != "")
-        for n, (words, d) in enumerate(wanted):
-            if sign * d[2] >= -1e-2:
-                points.append((*equal_area((d[0], d[1], d[2])), str(n + 1), f"to add, {n + 1}: {words}", "wanted"))
-        discs.append(Disc(title, tuple(points)))  # type: ignore[arg-type]
-    return Chart(tuple(discs), columns=2, legend=False)
+        # A pose with level Z is on the rim of both maps.
+        taken = [k for k in range(len(up)) if sign * up[k, 2] >= -1e-2]
+        names = [f"pose {k + 1}" if error is None else said(f"pose {k + 1}", mm_s2(error)[k], "mm/s²") for k in taken]
+        tips = [f"{name}, up {direction(up[k])}" for name, k in zip(names, taken, strict=True)]
+        to_add = [(n, words, d) for n, (words, d) in enumerate(wanted, 1) if sign * d[2] >= -1e-2]
+        useful = [f"{n}. {words}" for n, words, _ in to_add]
+        marks: list[Mark] = [*_horizon(), Points(*equal_area(up[taken]), tips, name="poses")]
+        if to_add:
+            at = equal_area(np.array([d for *_, d in to_add]))
+            marks.append(Points(*at, useful, name="most useful next poses", colour="accent", is_hollow=True))
+        x, y = (Scale(f"{axis} of 'up'", limits=(-1.08, 1.08)) for axis in "XY")
+        panels.append(Panel(x, y, tuple(marks), title=title, height_px=330, is_map=True))
+    return Chart(tuple(panels), columns=2)
+
+
+def _horizon() -> list[Mark]:
+    """The rim of a hemisphere seen along Z, circles of 30° and 60° above it, and two axes."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    circles: list[Mark] = []
+    for height in np.sin(np.radians((0.0, 30.0, 60.0))):
+        radius = math.sqrt(1.0 - height)
+        circles.append(Line(radius * np.cos(angle), radius * np.sin(angle), colour="soft", is_thin=True))
+    return [*circles, Level(x=0.0, colour="soft"), Level(y=0.0, colour="soft")]
+
+
+def equal_area(up: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lambert's azimuthal projection of unit vectors (n, 3) about the nearest pole; the equator has radius one."""
+    factor = 1.0 / np.sqrt(1.0 + np.abs(up[:, 2]))
+    return up[:, 0] * factor, up[:, 1] * factor
+
+
+def direction(force: FloatArray) -> str:
+    """A unit vector with two decimals."""
+    unit = force / np.linalg.norm(force)
+    return " ".join(f"{c:+.2f}".replace("-", "−") for c in unit)
 
 
 def direction_in_words(words: str) -> FloatArray | None:
@@ -229,8 +242,7 @@ def figure_blocks(calibration: Calibration, segments: Segments | None, recording
     if means is not None:
         error = _unseen(quality) if quality is not None and len(means) == len(quality.residual) else None
         caption = "Directions of 'up' in the body frame, upper and lower hemisphere. Empty regions are poses that were "
-        caption += "not recorded; a number is a pose (the first of coinciding ones); triangles are the most useful "
-        caption += "next poses, in that order."
+        caption += "not recorded."
         blocks.append(Picture("poses", caption, partial(poses_chart, calibration.accelerometer, means, error)))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from trihedron.arrays import XYZ, FloatArray, rms_of
+from trihedron.arrays import XYZ, rms_of
 from trihedron.records import Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.records.published import AFTER_MOVES, AT_REST, HELD_OUT, IN_SAMPLE, counted_moves
 from trihedron.report.axes import BIAS, axes_of
-from trihedron.report.calibration_charts import excluded_moves, move_noise_deg
+from trihedron.report.calibration_charts import direction, excluded_moves, move_noise_deg
 from trihedron.report.document import Block, Table
 from trihedron.report.numbers import each_with_sigma, in_mm_s2, plain_number, shown, with_sigma
 from trihedron.report.segments import state_of
@@ -112,12 +112,6 @@ def _held_out_cell(quality: FitQuality, k: int) -> str:
         return "–"
     sigma = float("nan") if quality.held_out_sigma is None else float(quality.held_out_sigma[k])
     return with_sigma(mm_s2_from_m_s2(float(quality.held_out[k])), mm_s2_from_m_s2(sigma))
-
-
-def direction(force: FloatArray) -> str:
-    """A unit vector with two decimals."""
-    unit = force / np.linalg.norm(force)
-    return " ".join(f"{c:+.2f}".replace("-", "−") for c in unit)
 
 
 def _move_table(quality: FitQuality, segments: Segments | None) -> Table:

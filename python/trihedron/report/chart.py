@@ -111,47 +111,27 @@ class Level:
     is_dashed: bool = False
 
 
-@dataclass(frozen=True)
-class Note:
-    """A text at a point, on the given ``side`` of it."""
-
-    x: float
-    y: float
-    text: str
-    colour: Colour = "ink"
-    side: Literal["above", "below", "right", "left"] = "above"
-
-
-Mark = Line | Points | Bars | Band | Span | Level | Note
+Mark = Line | Points | Bars | Band | Span | Level
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes. Panels of a chart are side by side where they fit."""
+    """One pair of axes; a map, as of a hemisphere, has equal units and no ticks. Panels are side by side where they
+    fit."""
 
     x: Scale
     y: Scale
     marks: tuple[Mark, ...]
     title: str = ""
     height_px: int = 230
-
-
-@dataclass(frozen=True, eq=False)
-class Disc:
-    """Directions on a hemisphere seen along Z (Lambert's equal-area projection), radius one at the rim.
-
-    ``points`` are (x, y, label, tooltip, kind), kind one of ``taken``, ``wanted``.
-    """
-
-    title: str
-    points: tuple[tuple[float, float, str, str, Literal["taken", "wanted"]], ...]
+    is_map: bool = False
 
 
 @dataclass(frozen=True)
 class Chart:
     """Panels under one legend. ``columns`` side by side on a wide page; linked panels zoom along ``x`` together."""
 
-    panels: tuple[Panel | Disc, ...]
+    panels: tuple[Panel, ...]
     columns: int = 1
     is_linked: bool = False
     legend: bool = True
@@ -171,7 +151,7 @@ def _xs(mark: Mark) -> list[FloatArray]:
         return _with_bars(mark.x, mark.sigma if mark.is_across else None)
     if isinstance(mark, Bars):
         return _from_base(mark.x, mark) if mark.is_across else [mark.x - mark.width / 2, mark.x + mark.width / 2]
-    return [np.array([mark.x])] if isinstance(mark, Note | Level) and mark.x is not None else []
+    return [np.array([mark.x])] if isinstance(mark, Level) and mark.x is not None else []
 
 
 def _ys(mark: Mark) -> list[FloatArray]:

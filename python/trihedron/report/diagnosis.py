@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import partial
 
 from trihedron.records import Finding
@@ -14,7 +13,6 @@ from trihedron.report.diagnosis_charts import (
     before_after_chart,
     forest_picture,
     noise_pictures,
-    strengths_picture,
     traces_picture,
 )
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
@@ -72,17 +70,16 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         differs = [one for one in diagnosis.parameters if one.significant] or differing_noise(diagnosis)
-        about = (forest_picture(diagnosis), *differing_blocks(diagnosis), *_traces(diagnosis))
+        about = (forest_picture(diagnosis.parameters), *differing_blocks(diagnosis), *_traces(diagnosis))
         sections.append(Section("Parameters that differ" if differs else "Parameters of the model", about))
     sections += [
         Section("Missing effects", (*effects_blocks(diagnosis), *effect_pictures(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *map(relation_facts, diagnosis.relations))),
-        *(Section("Cross-validation: before and after", (table,)) for table in _held_out(diagnosis)),
         Section("Candidates", candidates_blocks(diagnosis)),
         Section("Calibration and noise", _models(diagnosis)),
     ]
     if diagnosis.parameters:
-        sections.append(Section("Stage by stage", stages_blocks(diagnosis, MEANING)))
+        sections.append(Section("Stage by stage", stages_blocks(diagnosis)))
         sections += [Section("Parameters that agree", (table,)) for table in numbers_blocks(diagnosis)]
     if diagnosis.noise_compared:
         noise = (*noise_blocks(diagnosis), *noise_pictures(diagnosis))
@@ -100,23 +97,28 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         sections.append(Section("Findings", (findings_block(findings),)))
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, one) for one in diagnosis.residuals)))
-    strengths = strengths_picture(diagnosis)
     # By a reference alone a model without a gyro, or a simulation, is not compared.
     is_compared = model != "" and (diagnosis.parameters != () or not by_reference_alone(diagnosis))
-    if found is not None and strengths is not None and not is_model:
-        # The chart of the reference's own error is the lead then.
-        sections[0] = replace(sections[0], blocks=(*sections[0].blocks, strengths))
     document = Document(
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
         subtitle=f"{diagnosis.recording_source} against {model}" if is_compared else diagnosis.recording_source,
         verdict=whole_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
-        lead=strengths,
+        lead=_lead(diagnosis, sections),
         next_step=next_step_in_words(diagnosis, model, improved),
         stated_level=level_of(diagnosis),
     )
     return beside_model(document, found) if found is not None and is_model else beside_reference(document, found)
+
+
+def _lead(diagnosis: Diagnosis, sections: Iterable[Section]) -> Picture | None:
+    """The picture of what disagrees most: parameters that differ, else the residual with the largest χ²."""
+    pictures = {one.name: one for section in sections for one in section.blocks if isinstance(one, Picture)}
+    if any(one.significant for one in diagnosis.parameters):
+        return pictures["forest"]
+    drawn = [one for one in diagnosis.domains if one.domain in pictures]
+    return pictures[max(drawn, key=lambda one: one.chi2_per_dof).domain] if drawn else None
 
 
 def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -224,21 +226,16 @@ def _evidence(effect: AcceptedEffect) -> str:
     if effect.share is not None and effect.share > LEAST_SHARE:
         words += f"; by itself it explains {plain_number(100.0 * effect.share, 2)} % of the misfit"
     if effect.held_out:
-        words += "; cross-validated, " + _improvement(effect.held_out[0])
+        words += "; cross-validated, " + "; ".join(map(_improvement, effect.held_out))
     return words + "."
 
 
 def _improvement(held: HeldOut) -> str:
     chi2 = f"predictive χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
-    before, after = _before_and_after(held)
-    return f"{quantity(held)} {chi2}" if before == "–" else f"{quantity(held)} from {before} to {after} rms ({chi2})"
-
-
-def _before_and_after(held: HeldOut) -> tuple[str, str]:
-    """The rms without and with an effect; dashes where a domain has none."""
     if held.rms_before == held.rms_after == 0.0:
-        return "–", "–"
-    return size_in_words(held.rms_before, held.unit), size_in_words(held.rms_after, held.unit)
+        return f"{quantity(held)} {chi2}"
+    before, after = (size_in_words(rms, held.unit) for rms in (held.rms_before, held.rms_after))
+    return f"{quantity(held)} from {before} to {after} rms ({chi2})"
 
 
 def _remaining(diagnosis: Diagnosis) -> str:
@@ -254,26 +251,6 @@ def _remaining(diagnosis: Diagnosis) -> str:
         for d in left
     ]
     return capital("; ".join(said) + ".")
-
-
-def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    rows = tuple(
-        (
-            id_in_print(effect.id),
-            quantity(held),
-            *_before_and_after(held),
-            plain_number(held.chi2_per_dof_before),
-            plain_number(held.chi2_per_dof_after),
-        )
-        for effect in diagnosis.effects
-        for held in effect.held_out
-    )
-    if not rows:
-        return ()
-    head = ("effect", "residual", "rms before", "rms after", "predictive χ²/dof before", "after")
-    caption = "Poses and moves, cross-validated: predicted by fits that did not see them; χ²/dof by the noise that the "
-    caption += "model with the effect needs, 1 by that alone"
-    return (Table(head, rows, caption),)
 
 
 def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:

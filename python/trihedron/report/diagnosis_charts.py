@@ -16,7 +16,6 @@ from trihedron.report.chart import (
     MOST_OF_A_BAR,
     ROW_PX,
     TWO_SIGMA,
-    Bars,
     Chart,
     Colour,
     Level,
@@ -28,11 +27,10 @@ from trihedron.report.chart import (
     around_zero,
 )
 from trihedron.report.diagnosis_numbers import in_print
-from trihedron.report.diagnosis_words import LACKS, NOT_JUDGED, is_explained, judged_in_words
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope, said
-from trihedron.report.names import MEANING, axis_in_print, channel_in_print, id_in_print, label_of
-from trihedron.report.numbers import plain_number, shown, unit_in_print, with_sigma
+from trihedron.report.names import axis_in_print, channel_in_print, id_in_print, label_of
+from trihedron.report.numbers import shown, unit_in_print, with_sigma
 from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units
 
@@ -147,16 +145,8 @@ def _said(sensor: str) -> str:
     return "gyro" if sensor == "gyroscope" else sensor
 
 
-# Overview charts of a diagnosis: disagreement by domain, forest plots of parameters and noise, traces.
+# Overview charts of a diagnosis: forest plots of parameters, traces.
 
-THICK, SHADED = 0.28, 0.8
-"""Height of a bar and of the shade behind it, in rows."""
-FEWEST_DOMAINS = 2
-"""Fewest domains for which the chart is drawn; for one the table is enough."""
-MARGIN = 1.6
-"""Margin of the χ² axis beyond its data, as a factor."""
-JUDGED: dict[str, Colour] = {"disagrees": "accent", LACKS: "c2", "agrees": "soft", NOT_JUDGED: "shade"}
-EXPLAINED = "explained by the effects (χ² unchanged)"
 WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""
 SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
@@ -168,59 +158,11 @@ Shown = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
 the recording's noise."""
 
 
-def strengths_picture(diagnosis: Diagnosis) -> Picture | None:
-    """χ² of each domain, with its expectation by noise alone and the limit of agreement."""
-    if sum(d.chi2_per_dof > 0.0 for d in diagnosis.domains) < FEWEST_DOMAINS:
-        return None
-    caption = "How far the recording and the model disagree, domain by domain. χ² per degree of freedom is about 1 by "
-    caption += "noise alone"
-    if any(d.limit for d in diagnosis.domains):
-        caption += "; inside the shade the domain agrees (a healthy recording leaves one of them in "
-        caption += f"{100.0 * diagnosis.alpha:g} % of cases). Domains without a shade are judged by their worst "
-        caption += "pose, line or time"
-    if any(d.domain == "parameters" for d in diagnosis.domains):
-        caption += "; parameters allow for both uncertainties and the bias drift between sessions"
-    return Picture("strengths", f"{caption}.", partial(_strengths_chart, diagnosis))
-
-
-def _strengths_chart(diagnosis: Diagnosis) -> Chart:
-    """A row per domain: its limit in the shade, and bars without and with the effects in front of it."""
-    tests = [d for d in diagnosis.domains if d.chi2_per_dof > 0.0]
-    after = {d.domain: d for d in diagnosis.remaining} if diagnosis.effects else {}
-    names = tuple(MEANING[d.domain] for d in tests)
-    rows, apart = -np.arange(1.0, len(tests) + 1.0), THICK / 2.0 if after else 0.0
-    before, judged = np.array([d.chi2_per_dof for d in tests]), [judged_in_words(diagnosis, d) for d in tests]
-    pairs = [(d, after.get(d.domain)) for d in tests]
-    with_them = np.array([math.nan if now is None else now.chi2_per_dof for _, now in pairs])
-    explained = np.array([now is not None and is_explained(d, now) for d, now in pairs])
-    limit = np.array([d.limit or math.nan for d in tests])
-    seen = np.concatenate([before, with_them[with_them > 0.0], limit[np.isfinite(limit)], [1.0]])
-    low, high = float(seen.min()) / MARGIN, float(seen.max()) * MARGIN
-    base = np.full(len(tests), low)
-    marks: list[Mark] = []
-    sides: list[tuple[str, str, Colour, FloatArray, FloatArray, float]] = [
-        ("agrees up to here", "agrees up to", "shade", limit, rows, SHADED),
-        *(
-            (word, f"{word}:", colour, np.where([one == word for one in judged], before, math.nan), rows + apart, THICK)
-            for word, colour in JUDGED.items()
-        ),
-        ("with the effects", "with the effects:", "c1", np.where(explained, math.nan, with_them), rows - apart, THICK),
-        (EXPLAINED, f"{EXPLAINED}:", "c3", np.where(explained, with_them, math.nan), rows - apart, THICK),
-    ]
-    for name, words, colour, values, at, width in sides:
-        if np.any(np.isfinite(values)):
-            tips = [f"{what}, {words} χ²/dof {plain_number(v)}" for what, v in zip(names, values, strict=True)]
-            marks.append(Bars(values, at, width, tips, name, colour, base, is_across=True))
-    marks.append(Level(x=1.0, name="noise alone", is_dashed=True))
-    x = Scale("χ² per degree of freedom (logarithmic)", is_log=True, limits=(low, high))
-    return Chart((Panel(x, Scale("", names=names), tuple(marks), height_px=ROW_PX * (len(tests) + 1)),))
-
-
-def forest_picture(diagnosis: Diagnosis) -> Picture:
+def forest_picture(parameters: Sequence[ParameterDifference]) -> Picture:
     """Parameters of the recording relative to those of the model, as a forest plot."""
     caption = "Parameters of the recording (dots, 95 % interval) about those of the model (the line at 0); orange: "
     caption += "the group differs by more than both uncertainties and the bias drift between sessions."
-    return Picture("forest", caption, partial(_forest_chart, diagnosis.parameters))
+    return Picture("forest", caption, partial(_forest_chart, parameters))
 
 
 def _forest_chart(parameters: Sequence[ParameterDifference]) -> Chart:
@@ -259,7 +201,7 @@ def traces_picture(
     if chart is None:
         return ()
     caption = "Readings of the recording and of the simulation moved as it was, where the two lie farthest apart."
-    if any(isinstance(one, Panel) and one.y.label.startswith(CORRECTED) for one in chart.panels):
+    if any(one.y.label.startswith(CORRECTED) for one in chart.panels):
         caption += " One is in counts: both were corrected, each by its own parameters."
     return (Picture("traces", caption, lambda: chart),)
 

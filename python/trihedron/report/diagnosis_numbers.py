@@ -9,7 +9,7 @@ from trihedron.records.sessions import GEOMETRY, ONE_UNIT
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.document import Block, Facts, Paragraph, Table
 from trihedron.report.findings import ranged
-from trihedron.report.names import id_in_print, label_of, term_in_print
+from trihedron.report.names import MEANING, id_in_print, label_of, term_in_print
 from trihedron.report.numbers import (
     MINUS,
     capital,
@@ -185,23 +185,16 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         for n in diagnosis.noise_compared
     )
     head = ("sensor", "term", "ratio (interval)", "judged", "model", "recording", "unit")
-    blocks: list[Block] = [Table(head, rows, "Noise and sampling of the model and of the recording")]
-    remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
-    if remarks:
-        blocks.append(Facts(tuple(dict.fromkeys(remarks))))
-    return tuple(blocks)
+    return (Table(head, rows, "Noise and sampling of the model and of the recording"),)
 
 
-def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:
-    """Prediction errors of the recording by stage; ``size`` names the domains.
-
-    A stage equal to the one before it has no column, a domain that no stage changes no row.
-    """
+def stages_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Prediction errors by stage: one equal to the one before has no column, a domain that none changes no row."""
     stages = [one for k, one in enumerate(diagnosis.stages) if not k or one.domains != diagnosis.stages[k - 1].domains]
     units = {d.domain: shown(d.unit)[1] for stage in stages for d in stage.domains}
     cells = {domain: [_stage(stage, domain) for stage in stages] for domain in units}
     changed = [d for d in units if len(stages) == 1 or len(set(cells[d])) > 1]
-    rows = tuple((f"{size.get(d, d)} [{units[d]}]", *cells[d]) for d in changed)
+    rows = tuple((f"{MEANING[d]} [{units[d]}]", *cells[d]) for d in changed)
     if not rows:
         return (Paragraph("No stages: the model was fitted to this recording."),)
     kept = {stage.stage for stage in stages}
@@ -211,7 +204,7 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
     )
     caption += "needs (1 by it and uncertainty alone)"
     caption += f"; stages without change: {', '.join(same)}" if same else ""
-    unchanged = [size.get(d, d) for d in units if d not in changed]
+    unchanged = [MEANING[d] for d in units if d not in changed]
     caption += f"; the same in every stage: {', '.join(unchanged)}" if unchanged else ""
     return (Table(("rms", *(stage.stage.replace("-", " ") for stage in stages)), rows, caption),)
 

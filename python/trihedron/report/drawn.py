@@ -11,17 +11,15 @@ from trihedron.report.chart import (
     Band,
     Bars,
     Chart,
-    Disc,
     Level,
     Line,
     Mark,
-    Note,
     Panel,
     Points,
     Span,
     limits_of,
 )
-from trihedron.report.layout import UNITS, Places, apart, ticks
+from trihedron.report.layout import UNITS, Places, ticks
 from trihedron.report.numbers import plain_number, with_sigma
 
 COARSE = 10
@@ -42,23 +40,16 @@ def drawn(chart: Chart, caption: str) -> str:
     link = " data-linked" if chart.is_linked else ""
     parts = [_legend(chart)] if chart.legend else []
     parts.append(f'<div class="panels n{chart.columns}"{link}>')
-    parts += [_one(panel, caption, _surroundings(chart)) for panel in chart.panels]
+    parts += [_panel(panel, caption, _surroundings(chart)) for panel in chart.panels]
     parts.append("</div>")
     return "".join(parts)
 
 
-def _one(panel: Panel | Disc, caption: str, around: tuple[int, bool]) -> str:
-    if isinstance(panel, Disc):
-        return drawn_disc(panel, caption)
-    return _panel(panel, caption, around)
-
-
 def _surroundings(chart: Chart) -> tuple[int, bool]:
     """Alignment of panels: width of the y labels [letters] in a column of panels; a title line in a row of panels."""
-    panels = [panel for panel in chart.panels if isinstance(panel, Panel)]
     if chart.columns > 1:
-        return 0, any(panel.title for panel in panels)
-    return max((_letters(_y_ticks(panel)) for panel in panels), default=0), False
+        return 0, any(panel.title for panel in chart.panels)
+    return max((_letters(_y_ticks(panel)) for panel in chart.panels), default=0), False
 
 
 def _y_ticks(panel: Panel) -> list[tuple[float, str]]:
@@ -75,8 +66,8 @@ def _letters(said: Sequence[tuple[float, str]]) -> int:
 def _legend(chart: Chart) -> str:
     seen: dict[str, str] = {}
     for panel in chart.panels:
-        for mark in panel.marks if isinstance(panel, Panel) else ():
-            if not isinstance(mark, Note) and mark.name and mark.name not in seen:
+        for mark in panel.marks:
+            if mark.name and mark.name not in seen:
                 seen[mark.name] = _swatch(mark)
     if not seen:
         return ""
@@ -88,7 +79,7 @@ def _legend(chart: Chart) -> str:
 
 
 def _swatch(mark: Mark) -> str:
-    shape = {Line: "ln", Points: "dot", Bars: "box", Band: "box", Span: "box back", Level: "ln", Note: ""}[type(mark)]
+    shape = {Line: "ln", Points: "dot", Bars: "box", Band: "box", Span: "box back", Level: "ln"}[type(mark)]
     if (isinstance(mark, Line | Level) and mark.is_dashed) or (isinstance(mark, Points) and mark.is_hollow):
         shape += " open"
     return f"{shape} {mark.colour}"
@@ -108,8 +99,6 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     label_width = max(around[0], _letters(y_ticks))
     is_dense = sum(map(len, (word for _, word in x_ticks))) > FEW_LETTERS
     dense = "" if not is_dense else " named" if panel.x.names else " dense"
-    words = apart([mark for mark in panel.marks if isinstance(mark, Note)], at, panel.height_px)
-    notes = "".join(_note(note, at) for note in words)
     back = [_mark(mark, at) for mark in panel.marks if isinstance(mark, Band)] + _spans(panel, at)
     front = [_mark(mark, at) for mark in panel.marks if not isinstance(mark, Band | Span)]
     about = f"{panel.title}: {caption}" if panel.title else caption
@@ -121,13 +110,14 @@ def _panel(panel: Panel, caption: str, around: tuple[int, bool]) -> str:
     if _has_room_for_names(panel):
         spec += f' data-xnames="{escape("|".join(panel.x.names))}"'
     spec += f' data-ynames="{escape("|".join(panel.y.names))}"' if panel.y.names else ""
+    kind = "panel map" if panel.is_map else "panel"
     return (
-        f'<div class="panel" {spec} style="--labels:{label_width}ch;--high:{panel.height_px}px">{title}'
+        f'<div class="{kind}" {spec} style="--labels:{label_width}ch;--high:{panel.height_px}px">{title}'
         f'<div class="ylabel">{escape(panel.y.label)}</div>'
         f'<div class="yticks" aria-hidden="true">{y_words}</div>'
         f'<div class="plot"><svg role="img" aria-label="{escape(about)}" viewBox="0 0 {UNITS} {UNITS}" '
         f'preserveAspectRatio="none"><g class="back">{"".join(back)}</g><path class="grid" d="{grid}"/>'
-        f'<g class="front">{"".join(front)}</g></svg>{notes}</div>'
+        f'<g class="front">{"".join(front)}</g></svg></div>'
         f'<div class="xticks{dense}" aria-hidden="true">{x_words}</div>'
         f'<div class="xlabel">{escape(panel.x.label)}</div></div>'
     )
@@ -139,12 +129,6 @@ def _has_room_for_names(panel: Panel) -> bool:
 
 def _word(text: str, place: str) -> str:
     return f'<span style="{place}">{escape(text)}</span>'
-
-
-def _note(note: Note, at: Places) -> str:
-    x, y = float(at.x(note.x)), float(at.y(note.y))
-    place = f"left:{x / UNITS:.2%};top:{y / UNITS:.2%}"
-    return f'<span class="tag {note.side} t-{note.colour}" style="{place}">{escape(note.text)}</span>'
 
 
 def _mark(mark: Mark, at: Places) -> str:
@@ -303,42 +287,3 @@ def said(what: str, value: float, unit: str, sigma: float | None = None) -> str:
     """Tooltip of a point: ``pose 7: 1.53 ± 0.98 mm/s²``."""
     number = plain_number(value) if sigma is None else with_sigma(value, sigma)
     return f"{what}: {number} {unit}".strip()
-
-
-# Panels without axes: directions on a disc.
-
-_RADIUS = 100.0
-
-
-def drawn_disc(disc: Disc, caption: str) -> str:
-    """Rim, circles of 30° and 60° above it, axes X and Y, poses taken and poses wanted."""
-    circles = "".join(
-        f'<circle class="rim" r="{_RADIUS * math.sqrt(1.0 - math.sin(math.radians(e))):.1f}"/>' for e in (0, 30, 60)
-    )
-    cross = f'<path class="rim" d="M-{_RADIUS} 0H{_RADIUS}M0-{_RADIUS}V{_RADIUS}"/>'
-    names = "".join(
-        f'<text x="{x}" y="{y}">{word}</text>'
-        for word, x, y in (("+X", 118, 3), ("−X", -118, 3), ("+Y", 0, -111), ("−Y", 0, 119))
-    )
-    marks = []
-    # Wanted poses are drawn on top.
-    for x, y, label, said, kind in sorted(disc.points, key=lambda p: p[4]):
-        px, py, tip = f"{_RADIUS * x:.1f}", f"{-_RADIUS * y:.1f}", f'data-t="{escape(said)}"'
-        if kind == "taken":
-            shape, drop = f'<circle class="pose" {tip} cx="{px}" cy="{py}" r="7.5"/>', 3.0
-        else:
-            shape, drop = f'<path class="pose" {tip} d="M{px} {py}m0-10l9 16h-18z"/>', 4.0
-        name = f'<text class="{kind}" x="{px}" y="{drop - _RADIUS * y:.1f}">{escape(label)}</text>' if label else ""
-        marks.append(shape + name)
-    about = f"{disc.title}: {caption}"
-    return (
-        f'<div class="disc"><div class="ptitle">{escape(disc.title)}</div>'
-        f'<svg role="img" aria-label="{escape(about)}" viewBox="-128 -122 256 244">{circles}{cross}{names}'
-        f"{''.join(marks)}</svg></div>"
-    )
-
-
-def equal_area(up: tuple[float, float, float]) -> tuple[float, float]:
-    """Lambert's azimuthal projection of a unit vector about the nearest pole; the equator has radius one."""
-    factor = 1.0 / math.sqrt(1.0 + abs(up[2]))
-    return up[0] * factor, up[1] * factor

@@ -80,7 +80,6 @@ def _changed_chart(diagnosis: Diagnosis, chosen: Sequence[DomainResiduals]) -> C
         factor, unit = shown(one.unit)
         drawn = residuals_chart(diagnosis, one).panels
         for panel, values in zip(drawn, (one.before, one.after), strict=True):
-            assert isinstance(panel, Panel)
             rms = float(np.sqrt(np.nanmean(values**2)))
             title = f"{panel.title}, {IN_SAMPLE}: {plain_number(factor * rms)} {unit} rms"
             panels.append(replace(panel, title=title))

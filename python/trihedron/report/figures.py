@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from textwrap import fill
 from typing import cast
 
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -20,11 +19,9 @@ from trihedron.report.chart import (
     Bars,
     Chart,
     Colour,
-    Disc,
     Level,
     Line,
     Mark,
-    Note,
     Panel,
     Points,
     Scale,
@@ -45,8 +42,6 @@ WIDTH_IN = 9.5
 DPI = 110
 PX_AN_INCH = 140.0
 """Pixels of a page's panel height per inch of a figure."""
-HIGH_PX = 420
-"""Height of a square panel [px]."""
 FEW_DECADES = 100.0
 """Logarithmic axes with a smaller ratio of limits have three labels per decade."""
 
@@ -80,9 +75,8 @@ def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
     if len(axes) != len(laid_out):
         raise InputError(f"this figure needs {len(laid_out)} axes, one a panel; ax has {len(axes)}.")
     for axis, panel in zip(axes, laid_out, strict=True):
-        _draw_any(axis, panel)
-        if isinstance(panel, Panel):
-            _name_below(axis, panel.x)
+        _draw_panel(axis, panel)
+        _name_below(axis, panel.x)
     return cast(Figure, axes[0].figure)
 
 
@@ -92,26 +86,26 @@ def draw_chart(chart: Callable[[], Chart]) -> Figure:
     columns, panels = laid_out.columns, laid_out.panels
     rows = -(-len(panels) // columns)
     is_titled = any(panel.title for panel in panels)
-    high_px = max((panel.height_px if isinstance(panel, Panel) else HIGH_PX for panel in panels), default=HIGH_PX)
+    high_px = max(panel.height_px for panel in panels)
     figure = ShownFigure(
         figsize=(WIDTH_IN + columns - 1, 0.9 + (high_px / PX_AN_INCH + 0.5 * is_titled) * rows),
         dpi=DPI,
         layout="constrained",
     )
     FigureCanvasAgg(figure)
-    along = {panel.x.label if isinstance(panel, Panel) else None for panel in panels}
+    along = {panel.x.label for panel in panels}
     axes: list[Axes] = list(figure.subplots(rows, columns, sharex=len(along) == 1, squeeze=False).ravel())
     for axis, panel in zip(axes, panels, strict=False):
         axis.spines[["top", "right"]].set_visible(False)
         axis.tick_params(labelsize=8.5, color=COLOURS["ink"])
-        _draw_any(axis, panel)
+        _draw_panel(axis, panel)
         if laid_out.legend and columns == 1 and (named := _named([axis])):
             marks, names = named.values(), named.keys()
             axis.legend(marks, names, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=7)
     for k, (axis, panel) in enumerate(zip(axes, panels, strict=False)):
-        if isinstance(panel, Panel) and (len(along) > 1 or k + columns >= len(panels)):
+        if len(along) > 1 or k + columns >= len(panels):
             # The lowest panel of its column shows the labels that a shared axis hides.
-            axis.tick_params(labelbottom=True)
+            axis.tick_params(labelbottom=not panel.is_map)
             _name_below(axis, panel.x)
     for axis in axes[len(panels) :]:
         axis.set_axis_off()
@@ -123,31 +117,6 @@ def draw_chart(chart: Callable[[], Chart]) -> Figure:
 def _named(axes: Sequence[Axes]) -> dict[str, Artist]:
     """Legend entries by name, each once, although the colour may differ between panels."""
     return {name: mark for axis in axes for mark, name in zip(*axis.get_legend_handles_labels(), strict=True)}
-
-
-def _draw_any(axis: Axes, panel: Panel | Disc) -> None:
-    if isinstance(panel, Panel):
-        _draw_panel(axis, panel)
-        return
-    axis.set_title(panel.title, fontsize=8.5, loc="left")
-    _rim(axis)
-    for x, y, label, _, kind in panel.points:
-        shape, colour = ("o", COLOURS["c1"]) if kind == "taken" else ("^", COLOURS["accent"])
-        axis.plot(x, y, shape, markersize=9, color=colour, alpha=0.85)
-        axis.annotate(label, (x, y), ha="center", va="center", fontsize=5.5, color="white")
-
-
-def _rim(axis: Axes) -> None:
-    """A hemisphere seen along Z: its rim, circles of 30° and 60° above it, and two axes."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    for elevation_deg in (0.0, 30.0, 60.0):
-        radius = np.sqrt(1.0 - np.sin(np.radians(elevation_deg)))
-        axis.plot(radius * np.cos(angle), radius * np.sin(angle), color=COLOURS["grey"], linewidth=0.6, zorder=0)
-    for label, x, y in (("+X", 1.15, 0.0), ("−X", -1.15, 0.0), ("+Y", 0.0, 1.15), ("−Y", 0.0, -1.15)):
-        axis.annotate(label, (x, y), ha="center", va="center", fontsize=9, color=COLOURS["ink"])
-        axis.plot([0.0, x / 1.15], [0.0, y / 1.15], color=COLOURS["grey"], linewidth=0.6, zorder=0)
-    axis.set_aspect("equal")
-    axis.set_axis_off()
 
 
 def _draw_panel(axis: Axes, panel: Panel) -> None:
@@ -162,6 +131,9 @@ def _draw_panel(axis: Axes, panel: Panel) -> None:
     if panel.title:
         axis.set_title(panel.title, fontsize=8.5, loc="left")
     axis.set_ylabel(_UNIT.sub("\n[", panel.y.label), fontsize=8)
+    if panel.is_map:
+        axis.set_aspect("equal")
+        axis.tick_params(left=False, bottom=False, labelleft=False)
     if panel.y.names:
         places = [-k for k in range(1, len(panel.y.names) + 1)]
         axis.set_yticks(places, [fill(n, MOST_LETTERS) for n in panel.y.names], fontsize=7)
@@ -218,5 +190,3 @@ def _draw(axis: Axes, mark: Mark) -> None:
         # Other colours than the pale shade are made transparent, so that curves stay visible.
         alpha = 1.0 if mark.colour == "shade" else 0.35
         axis.axvspan(mark.first, mark.last, color=colour, alpha=alpha, linewidth=0, zorder=0, label=mark.name or None)
-    elif isinstance(mark, Note):
-        axis.annotate(mark.text, (mark.x, mark.y), xytext=(3, 3), textcoords="offset points", fontsize=7, color=colour)

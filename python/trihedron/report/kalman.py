@@ -17,13 +17,14 @@ from trihedron.records import (
     KalmanCalibration,
     NormKalmanCalibration,
 )
+from trihedron.records.plain import as_plain
 from trihedron.records.published import BY_FILTER
 from trihedron.report.calibration import FRAMES, parameter_table
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Panel, Points, Scale
 from trihedron.report.document import WITHIN, Block, Document, Facts, Picture, Section, Table
 from trihedron.report.drawn import said
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import each_with_sigma, in_mm_s2, one_of, plain_number, unit_in_print
+from trihedron.report.numbers import each_with_sigma, in_mm_s2, plain_number, unit_in_print
 from trihedron.units import mm_s2_from_m_s2
 
 TEST = "Test the calibration on another recording: `trihedron verify FILE OTHER_LOG`."
@@ -97,8 +98,6 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
         caption = f"Constants of {name.upper()} after every pose by every method, with the filter's 3 σ band around "
         caption += "its last value."
         pictures.append(Picture(f"convergence-{name}", caption, partial(convergence_chart, axis, raw_unit)))
-    drift = "Bias drift that the filter saw: while it ran, and smoothed with all readings, with 1 σ bands."
-    pictures.append(Picture("drift", drift, partial(drift_chart, outcome.axes, raw_unit)))
     return [
         Section("Result", (Facts(facts), *(_constants_table(axis, raw_unit) for axis in outcome.axes))),
         Section("Calibration", (parameter_table("accelerometer", outcome.accelerometer),)),
@@ -117,12 +116,7 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
             _residual_words(outcome.residual_m_s2) + ("" if outcome.consistency.n else _IN_SAMPLE),
         ),
     )
-    convergence = "S and b after every pose, with the 3 σ band around their last values."
-    picture = Picture("convergence", convergence, partial(norm_convergence_chart, outcome))
-    return [
-        Section("Result", (Facts(facts), parameter_table("accelerometer", outcome.accelerometer))),
-        Section("Figures", (picture,)),
-    ]
+    return [Section("Result", (Facts(facts), parameter_table("accelerometer", outcome.accelerometer)))]
 
 
 def _residual_words(residual: FloatArray) -> str:
@@ -169,46 +163,12 @@ def _pose_table(outcome: KalmanCalibration) -> Table:
 
 
 def kalman_record(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> dict[str, Any]:
-    """The result for JSON: the calibration file's content, the tracks and the innovations."""
-    out: dict[str, Any] = dict(calibration_document(calibration))
-    if isinstance(outcome, KalmanCalibration):
-        out["constants"] = list(CONSTANT_NAMES)
-        out["axes"] = [_axis_record(axis) for axis in outcome.axes]
-        out["residual_m_s2"] = outcome.residual_m_s2.tolist()
-        return out
-    return out | {
-        "parameters": outcome.parameters.tolist(),
-        "parameters_sigma": outcome.sigma.tolist(),
-        "innovation_m_s2": outcome.innovation.tolist(),
-        "innovation_sigma_m_s2": outcome.innovation_sigma.tolist(),
-        "consistency": _consistency_record(outcome.consistency),
-        "residual_m_s2": outcome.residual_m_s2.tolist(),
-    }
+    """The calibration file's content, and the filter's: tracks, innovations, bias drift, residuals."""
+    names = {"constants": list(CONSTANT_NAMES)} if isinstance(outcome, KalmanCalibration) else {}
+    return {**as_plain(outcome), **names, **calibration_document(calibration)}
 
 
-def _consistency_record(seen: Consistency) -> dict[str, Any]:
-    return dict(vars(seen)) | {"autocorrelation": list(seen.autocorrelation)}
-
-
-def _axis_record(axis: AxisKalmanResult) -> dict[str, Any]:
-    return {
-        "axis": AXES[axis.axis],
-        "noise": dict(vars(axis.noise)),
-        "constants": axis.constants.tolist(),
-        "covariance": axis.covariance.tolist(),
-        "batch": {m: {"constants": c.tolist(), "sigma": s.tolist()} for m, (c, s) in axis.batch.items()},
-        "tracks": [
-            {"method": t.method, "constants": t.constants.tolist(), "sigma": t.sigma.tolist()} for t in axis.tracks
-        ],
-        "innovation": axis.innovation.tolist(),
-        "innovation_sigma": axis.innovation_sigma.tolist(),
-        "drift": axis.smoothed_drift.tolist(),
-        "drift_sigma": axis.smoothed_drift_sigma.tolist(),
-        "consistency": _consistency_record(axis.consistency),
-    }
-
-
-# Charts of a calibration by Kalman filter: convergence, innovations, slow noise.
+# Charts of a calibration by Kalman filter: convergence, innovations.
 
 WINDOW = 15
 """Number of poses in a running mean of NIS, with a 99 % interval of 0.31 to 2.19 (χ² with 15 degrees of freedom)."""
@@ -235,29 +195,7 @@ def convergence_chart(axis: AxisKalmanResult, raw_unit: str) -> Chart:
         band = Band(pose, last - 3 * sigma, last + 3 * sigma, "3 σ of the filter")
         x = Scale("poses", whole=True, limits=(1, max(2, len(pose))))
         panels.append(Panel(x, y, (band, *batch, *lines), height_px=150))
-    return Chart(tuple(panels), columns=2, is_linked=False)
-
-
-def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
-    """S and b after every pose with their 3σ bands, without entries that the frame fixes at 0."""
-    n = len(outcome.parameters)
-    pose = np.arange(1, n + 1, dtype=np.float64)
-    panels = []
-    for k in range(12):
-        name = f"S_{AXES[k // 3]}{AXES[k % 3]}" if k < 9 else f"b_{AXES[k - 9]}"
-        value, sigma = outcome.parameters[:, k], outcome.sigma[:, k]
-        if sigma[-1] == 0.0:
-            continue
-        last = float(value[-1])
-        raw = outcome.accelerometer.raw_unit
-        unit = "m/s²" if k >= 9 else "" if raw == "m/s^2" else f"m/s² per {one_of(raw)}"
-        y = Scale(f"{name} [{unit}]" if unit else name, unit, limits=_frame([value], sigma, last))
-        marks = (
-            Band(pose, last - 3 * sigma, last + 3 * sigma, "3 σ about the last value"),
-            Line(pose, value, "after so many poses", "c1"),
-        )
-        panels.append(Panel(Scale("poses", whole=True, limits=(1, max(2, n))), y, marks, height_px=110))
-    return Chart(tuple(panels), columns=3)
+    return Chart(tuple(panels), columns=2)
 
 
 def _frame(tracks: Sequence[FloatArray], sigma: FloatArray, last: float) -> tuple[float, float]:
@@ -294,20 +232,3 @@ def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration
     below = -0.04 * max([float(np.max(m.y)) for m in marks if isinstance(m, Points)], default=0.0)
     y = Scale("innovation² / predicted variance", "", includes=(below,))
     return Chart((Panel(Scale("pose", limits=(0.3, n + 0.7), whole=True), y, (band, Level(y=1.0), *marks)),))
-
-
-def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
-    """Slow noise as filtered, and as smoothed with all readings."""
-    panels = []
-    for result in results:
-        pose = np.arange(1, len(result.drift) + 1, dtype=np.float64)
-        smooth, sigma = result.smoothed_drift, result.smoothed_drift_sigma
-        marks = (
-            Band(pose, smooth - sigma, smooth + sigma, "1 σ"),
-            Line(pose, result.drift, "filtered", "accent", is_thin=True),
-            Line(pose, smooth, "smoothed", "c1"),
-        )
-        unit = unit_in_print(raw_unit)
-        y = Scale(f"{XYZ[result.axis]} [{unit}]", unit)
-        panels.append(Panel(Scale("pose", whole=True, limits=(1, max(2, len(pose)))), y, marks, height_px=140))
-    return Chart(tuple(panels), is_linked=True)

@@ -9,7 +9,7 @@ from trihedron.records.noise import of_axes
 from trihedron.report.document import Block, Code, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.names import axis_in_print
-from trihedron.report.noise_charts import allan_chart, part_names
+from trihedron.report.noise_charts import allan_chart
 from trihedron.report.noise_units import IN_SLOW_NOISE, TERM_WORDS, customary, term_in_words, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma_and_power
 from trihedron.report.segments import rate_in_words
@@ -248,12 +248,6 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
 
 def noise_picture(noise: Noise) -> Picture:
     """All curves of a log in one figure, a row for each sensor."""
-    caption = "Allan deviation with its 95 % interval, the parts of the fitted sum (thin, each named) and the sum "
-    caption += "(dashed); N is its line at 1 s"
-    names = part_names(noise.curve, noise.axes)
-    caption += ", K at 3 s" if any(name.startswith("K ") for name in names) else ""
-    caption += ", B 1.5 times its flat line" if any(name.startswith("B ") for name in names) else ""
-    caption += "; a term with < is in the sum and does not show by itself" if any("<" in name for name in names) else ""
-    found = any(axis.optimal_averaging() is not None for axis in noise.axes)
-    caption += "; the orange mark is the least deviation, beyond which a mean is no better." if found else "."
+    caption = "Allan deviation with its 95 % interval and the fitted sum (dashed) of the noise terms (thin): N is its "
+    caption += "line at 1 s, K at 3 s, B 1.5 times its flat line. A mean is no better beyond the smallest deviation."
     return Picture("allan", caption, partial(allan_chart, noise.curve, _groups(noise)))

@@ -85,11 +85,6 @@
         }
       }
       this.svg.querySelector(".grid").setAttribute("d", grid);
-      for (const note of this.plot.querySelectorAll(".tag")) {
-        note.dataset.left ??= note.style.left; note.dataset.top ??= note.style.top;
-        const x = parseFloat(note.dataset.left) / 100, y = 1 - parseFloat(note.dataset.top) / 100;
-        note.style.left = 100 * (x - x0) / (x1 - x0) + "%"; note.style.top = 100 * (1 - (y - y0) / (y1 - y0)) + "%";
-      }
     }
     marks() {
       if (this.ready) return this.ready;
@@ -189,8 +184,6 @@
     }
   }
   const all = [...document.querySelectorAll(".panel")].map((node) => new Panel(node));
-  const labels = (node, text) => { node.addEventListener("pointermove", (e) => show(text, e)); node.addEventListener("pointerleave", hide); };
-  for (const node of document.querySelectorAll(".pose")) labels(node, node.dataset.t);
 
   /* Tables: a click on a head sorts by it, the third click brings back the order of the file. */
   const key = (text) => {

@@ -46,6 +46,7 @@ _NOT_SHOWN = (Picture, FindingList, Code)
 
 def to_html(document: Document) -> str:
     """The whole report with embedded figures; its policy allows no network access and no script but its own."""
+    document = _with_lead_once(document)
     sections = [
         {"heading": one_line(section.heading), "blocks": [_shown(block) for block in section.blocks]}
         for section in document.sections
@@ -67,6 +68,16 @@ def to_html(document: Document) -> str:
         policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
     )
     return escaped(page)
+
+
+def _with_lead_once(document: Document) -> Document:
+    """The document without the picture beside the verdict in its sections."""
+    name = "" if document.lead is None else document.lead.name
+    rest = (
+        replace(one, blocks=tuple(block for block in one.blocks if getattr(block, "name", None) != name))
+        for one in document.sections
+    )
+    return replace(document, sections=tuple(one for one in rest if one.blocks))
 
 
 def _noticed(document: Document) -> tuple[Markup, list[tuple[str, str]], str]:

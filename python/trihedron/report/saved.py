@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 import numpy as np
 
@@ -107,8 +107,7 @@ def _converter() -> Converter:
     made.register_unstructure_hook(
         Picture, lambda one: {"name": one.name, "caption": one.caption, "chart": made.unstructure(one.chart())}
     )
-    panels, _ = get_args(get_type_hints(chart.Chart)["panels"])
-    for kinds in (chart.Mark, panels, document.Block):
+    for kinds in (chart.Mark, document.Block):
         configure_tagged_union(kinds, made, tag_name="is")
     return made
 

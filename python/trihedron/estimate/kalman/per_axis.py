@@ -198,7 +198,7 @@ def _one_axis(
     mean, sigma = np.zeros(4), np.full(4, DIFFUSE * model.fast_variance(float(np.min(pose))) ** 0.5)
     begin = _core.KalmanStart(mean, sigma, np.zeros(4))
     poses = _core.KalmanPoses(z, f, start, pose, extra)
-    constants, stated, covariance, innovation, variance, drift, _ = _core.kalman_track(model, begin, poses)
+    constants, stated, covariance, innovation, variance, _, _ = _core.kalman_track(model, begin, poses)
     _, _, smoothed, smoothed_sigma = _core.kalman_smooth(model, begin, poses)
     # Ordinary least squares uses only the variance of one reading.
     white = model.fast_variance(float(np.median(pose))) + float(np.median(extra))
@@ -222,7 +222,6 @@ def _one_axis(
         innovation=innovation,
         innovation_sigma=innovation_sigma,
         is_settled=is_settled(innovation_sigma, len(mean)),
-        drift=drift,
         smoothed_drift=smoothed,
         smoothed_drift_sigma=smoothed_sigma,
         consistency=check_innovations(innovation, innovation_sigma, len(mean)),
