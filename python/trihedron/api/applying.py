@@ -66,8 +66,7 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
         What to write, as JSON of its schema (docs/calibration-file.md).
     path : file
         Where to.
-    overwrite : bool
-        Whether a file that exists is replaced.
+    overwrite : bool, whether a file that exists is replaced
 
     Returns
     -------

@@ -52,8 +52,7 @@ def calibrate(
     ----------
     recording : Recording, or what trihedron.read takes
         Without a gyro the accelerometer is calibrated alone.
-    segments : Segments
-        Found when not given.
+    segments : Segments, found when not given
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place. Without it 9.80665 m/s² is used, and a finding states the possible error.
     method : "joint", "separate" or "faces"
@@ -78,8 +77,7 @@ def calibrate(
         static poses are not needed.
     reference_columns : str
         Its columns where names do not state them.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------

@@ -78,8 +78,7 @@ def capture(
         Rate of a board that sends no time.
     wait_s : float
         How long to wait for a board that was unplugged.
-    overwrite : bool
-        Whether a file that exists is replaced.
+    overwrite : bool, whether a file that exists is replaced
     on_block : callable, optional
         Called with every block of samples as it is written.
 

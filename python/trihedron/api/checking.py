@@ -27,8 +27,7 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     ----------
     recording : Recording, or what trihedron.read takes
         The log to check.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------

@@ -48,8 +48,7 @@ def diagnose(
         Poses and moves of one sensor.
     gravity_m_s2 or latitude_deg, height_m : float
         That of the calibration unless given.
-    segments : Segments
-        Found when not given.
+    segments : Segments, found when not given
     calibration : calibration or path, optional
         The model to compare with the recording, with its uncertainties. Without it one is fitted to the recording.
     against : Recording, Scenario or path, optional
@@ -60,8 +59,7 @@ def diagnose(
         moved along (docs/reference.md).
     alpha : float
         Probability that a healthy recording is called anything but consistent.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
     reference_columns : str
         Its columns where names do not state them.
 

@@ -49,8 +49,7 @@ def export(
         (.param, .parm, QGroundControl's .params); "none" where the readings were raw.
     output : path, optional
         Where to write; each of several files gets its own ending.
-    overwrite : bool
-        Whether a file that exists is replaced.
+    overwrite : bool, whether a file that exists is replaced
 
     Returns
     -------

@@ -33,8 +33,7 @@ def extend(
         Of :func:`trihedron.calibrate`, in the lower-triangular frame.
     alpha : float
         False-alarm probability of the diagnosis.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------

@@ -65,12 +65,10 @@ def kalman(
         Without it, the noise inside the poses.
     frame : "lower" or "symmetric"
         Body frame where there is no reference; with one it is the frame of the reference.
-    segments : Segments
-        Found when not given.
+    segments : Segments, found when not given
     gravity_m_s2 or latitude_deg, height_m : float
         As for :func:`calibrate`.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------

@@ -52,10 +52,8 @@ def rank(
     recording : Recording, or what trihedron.read takes
     gravity_m_s2 or latitude_deg, height_m : float
         By default that of the trihedron calibrations.
-    segments : Segments
-        Found when not given.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    segments : Segments, found when not given
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------

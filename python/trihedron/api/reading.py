@@ -58,8 +58,7 @@ def read(
         Which topic, dataset or member of a file with several.
     instance : int or str
         Which of several IMUs in one file.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------
@@ -136,8 +135,7 @@ def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Seg
     ----------
     recording : Recording, or what trihedron.read takes
         Readings of one or both sensors.
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------
@@ -174,8 +172,7 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
         What to write.
     output : file
         ``.csv``, ``.npz`` or ``.parquet``.
-    overwrite : bool
-        Whether a file that exists is replaced.
+    overwrite : bool, whether a file that exists is replaced
     options
         Of :func:`trihedron.read`.
 

@@ -47,16 +47,14 @@ def verify(
         What to test.
     recording : Recording, or what trihedron.read takes
         A session that the calibration was not made from.
-    segments : Segments
-        Found when not given.
+    segments : Segments, found when not given
     gravity_m_s2 or latitude_deg, height_m : float
         That of the calibration unless given.
     limit_mg, limit_deg : float, optional
         Largest acceptable rms gravity error [mg] and tilt error [°]: beyond one there is a serious finding. Without
         a limit, errors above ten times those expected are serious; within a limit they are a warning (the gyro's
         rate in static poses, within that of tilt).
-    progress : callable
-        Called with the share done (0 to 1) and what is being done.
+    progress : callable(share done from 0 to 1, what is being done)
 
     Returns
     -------

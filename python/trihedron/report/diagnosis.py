@@ -226,7 +226,7 @@ def _evidence(effect: AcceptedEffect) -> str:
     if effect.share is not None and effect.share > LEAST_SHARE:
         words += f"; by itself it explains {plain_number(100.0 * effect.share, 2)} % of the misfit"
     if effect.held_out:
-        words += "; cross-validated, " + "; ".join(map(_improvement, effect.held_out))
+        words += "; cross-validated, " + _improvement(effect.held_out[0])
     return words + "."
 
 
@@ -258,8 +258,7 @@ def _traces(diagnosis: Diagnosis) -> tuple[Picture, ...]:
     recording, simulated, segments = (getattr(diagnosis, name, None) for name in ("recording", "simulated", "segments"))
     if recording is None or simulated is None or segments is None:
         return ()
-    models = (getattr(diagnosis, "updated", None), getattr(diagnosis, "calibration", None))
-    return traces_picture(recording, simulated, segments, models)
+    return traces_picture(recording, simulated, segments)
 
 
 def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:

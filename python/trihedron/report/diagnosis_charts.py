@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray
-from trihedron.records import Calibration, Recording, Segments
+from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference
 from trihedron.records.domains import DomainResiduals
 from trihedron.report.chart import (
@@ -31,7 +31,6 @@ from trihedron.report.document import Block, Picture
 from trihedron.report.drawn import envelope, said
 from trihedron.report.names import axis_in_print, channel_in_print, id_in_print, label_of
 from trihedron.report.numbers import shown, unit_in_print, with_sigma
-from trihedron.sensor_model import correct
 from trihedron.units import ratio_of_units
 
 Side = tuple[str, FloatArray, FloatArray, FloatArray, tuple[str, ...]]
@@ -149,10 +148,6 @@ def _said(sensor: str) -> str:
 
 WINDOW_S = 6.0
 """Length of the traces [s]: a move and parts of the poses on both sides."""
-SENSOR_OF = {"accelerometer": "accelerometer", "gyro": "gyroscope"}
-CORRECTED = "corrected"
-Models = tuple[Calibration | None, Calibration | None]
-"""The recording's own parameters and those of the simulation."""
 Shown = tuple[str, tuple[FloatArray, str], FloatArray, FloatArray]
 """Sensor; readings (n, 3) of the recording and their unit; the simulation's at the same times; their difference over
 the recording's noise."""
@@ -193,22 +188,16 @@ def _forest(title: str, members: list[ParameterDifference]) -> Panel:
     return Panel(x, Scale("", names=names), marks, title=title, height_px=ROW_PX * (len(members) + 1))
 
 
-def traces_picture(
-    recording: Recording, simulated: Recording, segments: Segments, models: Models
-) -> tuple[Picture, ...]:
+def traces_picture(recording: Recording, simulated: Recording, segments: Segments) -> tuple[Picture, ...]:
     """Simulated and recorded readings where they differ most."""
-    chart = _traces_chart(recording, simulated, segments, models)
-    if chart is None:
-        return ()
+    chart = _traces_chart(recording, simulated, segments)
     caption = "Readings of the recording and of the simulation moved as it was, where the two lie farthest apart."
-    if any(one.y.label.startswith(CORRECTED) for one in chart.panels):
-        caption += " One is in counts: both were corrected, each by its own parameters."
-    return (Picture("traces", caption, lambda: chart),)
+    return () if chart is None else (Picture("traces", caption, lambda: chart),)
 
 
-def _traces_chart(recording: Recording, simulated: Recording, segments: Segments, models: Models) -> Chart | None:
+def _traces_chart(recording: Recording, simulated: Recording, segments: Segments) -> Chart | None:
     """A panel per sensor: its axis that differs most, in the move or pose where the sensors together differ most."""
-    sides = _both_sides(recording, simulated, segments, models)
+    sides = _both_sides(recording, simulated, segments)
     if not sides:
         return None
     time_s = recording.time_s
@@ -230,34 +219,23 @@ def _traces_chart(recording: Recording, simulated: Recording, segments: Segments
         )
         x = Scale("time [s]", "s", limits=(float(time_s[window[0]]), float(time_s[window[-1]])))
         title = f"{sensor} {XYZ[axis]}, about {name}"
-        is_as_read = mine is getattr(recording, SENSOR_OF[sensor])
-        y = Scale(f"{'reading' if is_as_read else CORRECTED} [{unit}]", unit)
+        y = Scale(f"reading [{unit}]", unit)
         panels.append(Panel(x, y, lines, title=title, height_px=190))
     return Chart(tuple(panels), columns=len(panels), is_linked=True)
 
 
-def _both_sides(recording: Recording, simulated: Recording, segments: Segments, models: Models) -> list[Shown]:
-    """Sensors of both logs, the simulation in the recording's unit; both calibrated where only one is in counts."""
+def _both_sides(recording: Recording, simulated: Recording, segments: Segments) -> list[Shown]:
+    """Sensors of both logs, the simulation in the recording's unit; none where only one is in counts."""
     out: list[Shown] = []
     mine_s, theirs_s = (log.time_s - log.time_s[0] for log in (recording, simulated))
     for name, sigma in (("accelerometer", segments.accelerometer_sigma), ("gyroscope", segments.gyroscope_sigma)):
         mine, theirs = getattr(recording, name), getattr(simulated, name)
         unit = getattr(recording, f"{name}_unit")
         scale = ratio_of_units(getattr(simulated, f"{name}_unit"), unit)
-        if mine is None or theirs is None or sigma is None:
+        if mine is None or theirs is None or sigma is None or scale is None:
             continue
-        printed = unit_in_print(unit.value)
-        if scale is None:
-            own, given = (None if model is None else getattr(model, name) for model in models)
-            if own is None or given is None:
-                continue
-            # Noise of raw readings, converted to SI by S.
-            sigma = np.abs(own.S) @ np.asarray(sigma)
-            mine, theirs, scale = correct(mine, own.S, own.b), correct(theirs, given.S, given.b), 1.0
-            printed = unit_in_print(own.si_unit)
         at = scale * np.column_stack([np.interp(mine_s, theirs_s, theirs[:, k]) for k in range(3)])
         at[mine_s > theirs_s[-1]] = math.nan
         noise = np.where(np.asarray(sigma) > 0.0, sigma, 1.0)
-        said = "gyro" if name == "gyroscope" else name
-        out.append((said, (mine, printed), at, (mine - at) / noise))
+        out.append((_said(name), (mine, unit_in_print(unit.value)), at, (mine - at) / noise))
     return out

@@ -1,15 +1,11 @@
 """Report of filter noise."""
 
-from functools import partial
 from typing import Any
 
-import numpy as np
-
-from trihedron.arrays import XYZ, FloatArray
+from trihedron.arrays import XYZ
 from trihedron.records.filter_noise import RANKED_S, Bounded, FilterNoise, IntervalCheck, SensorFilterNoise, Share
 from trihedron.records.plain import as_plain
-from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
-from trihedron.report.document import Block, Document, Facts, Picture, Section, Table, action_in_words
+from trihedron.report.document import Block, Document, Facts, Section, Table, action_in_words
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns, of_rows
 from trihedron.report.numbers import capital, how_many, listed, plain_number, unit_in_print, with_unit
@@ -53,9 +49,6 @@ def filter_noise_report(found: FilterNoise) -> Document:
         heading = "Cross-validation: the second half predicted from the first"
         sections.append(Section(heading, tuple(map(_tested, tested))))
     sections.append(Section("Findings", (findings_block(found.findings),)))
-    caption = "Error by the gyro (velocity: the accelerometer) alone after each horizon, the reference's own error "
-    caption += "with it: predicted from N and K, and actual; cross-validated."
-    picture = Picture("horizon", caption, partial(horizon_chart, found))
     # Where a calibration removes most of the error, it comes first.
     uncalibrated = (action_in_words(f) for f in found.findings if f.code == "filter-noise-uncalibrated")
     is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
@@ -65,7 +58,6 @@ def filter_noise_report(found: FilterNoise) -> Document:
         verdict=verdict_of(found.findings, _good(found), "Usable" + _predicted(found), "NOT TO BE TRUSTED"),
         is_trustworthy=is_trustworthy,
         sections=tuple(sections),
-        lead=picture if tested else None,
         next_step=next(uncalibrated, NEXT if len(found.sensors) == 2 else OF_ONE) if is_trustworthy else "",
     )
 
@@ -253,30 +245,3 @@ def filter_noise_columns(found: FilterNoise) -> Columns:
             sizes = (value.filter_value, value.lower, value.upper, value.is_limit)
             rows.append((one.sensor, term, *sizes, None if static is None else static.filter_value, one.unit + per))
     return of_rows(("sensor", "term", "value", "lower", "upper", "is_limit", "static", "unit"), rows)
-
-
-def horizon_chart(found: FilterNoise) -> Chart:
-    """One panel per sensor with a cross-validation on the other half."""
-    panels = tuple(_panel(one) for one in found.sensors if one.consistency)
-    return Chart(panels, columns=len(panels))
-
-
-def _panel(one: SensorFilterNoise) -> Panel:
-    factor, unit, what = OF_SENSOR[one.sensor]
-    h = np.array([c.horizon_s for c in one.consistency])
-
-    def both(predicted: str, actual: str) -> tuple[FloatArray, FloatArray, list[str]]:
-        pairs = np.array([(getattr(c, predicted), getattr(c, actual)) for c in one.consistency], dtype=np.float64)
-        expected, seen = factor * pairs.T
-        tips = [f"{plain_number(a)} {unit} over {plain_number(s)} s" for a, s in zip(seen, h, strict=True)]
-        return expected, seen, tips
-
-    predicted, actual, tips = both("predicted", "actual")
-    marks: list[Mark] = [Line(h, predicted, "predicted, effective N and K", "c1")]
-    marks.append(Points(h, actual, tips, None, "actual error", "c1"))
-    if one.consistency[0].static_predicted is not None:
-        predicted, actual, tips = both("static_predicted", "static_actual")
-        marks.append(Line(h, predicted, "predicted, static N and K", "accent", is_dashed=True))
-        marks.append(Points(h, actual, tips, None, "actual error of that filter", "accent", is_hollow=True))
-    x, y = Scale("horizon [s]", "s", is_log=True), Scale(f"{what} [{unit}]", unit, is_log=True)
-    return Panel(x, y, tuple(marks), title=one.sensor)

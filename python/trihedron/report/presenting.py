@@ -185,8 +185,7 @@ def report(result: object, path: str | os.PathLike[str] | None = None, *, overwr
         Of calibrate, verify, check, segment, diagnose, allan, plan and the others.
     path : file, optional
         ``.html`` with figures, ``.txt`` or ``.json``.
-    overwrite : bool
-        Whether a file that exists is replaced.
+    overwrite : bool, whether a file that exists is replaced
 
     Returns
     -------
