@@ -20,7 +20,7 @@ from trihedron.comparison.parameters import compare_numbers
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.diagnosis_numbers import differing_numbers
+from trihedron.report.diagnosis_numbers import groups_in_short
 from trihedron.report.document import Picture
 from trihedron.simulate import Scenario, hand_session, scenario_by_name, simulate
 from trihedron.simulate.effects import with_effect
@@ -40,14 +40,13 @@ def fitted(S_a, b_a, S_g, b_g, sigma=1e-6, units=("counts", "counts")):
     return FittedModel(FittedSensor(S_a, b_a, units[0]), FittedSensor(S_g, b_g, units[1]), covariance)
 
 
-@pytest.mark.parametrize(("sigmas", "named"), [((1.0, 2.5, 2.0), ["Y"]), ((8.0, 1.0, 5.0), ["X", "Z"])])
-def test_of_a_group_that_differs_the_parameters_that_differ_are_named_or_the_one_that_does_most(sigmas, named):
+@pytest.mark.parametrize(("uncertain", "size"), [(1.0, "9.0"), (4.0, "5.0")])
+def test_the_size_of_a_group_that_differs_is_that_of_a_component_that_clearly_does(uncertain, size):
     group = [
-        ParameterDifference("gyro-bias", "gyroscope", axis, 0.0, s * 1e-4, s * 1e-4, 1e-4, "rad/s", 1e-3, True)
-        for axis, s in zip("xyz", sigmas, strict=True)
+        ParameterDifference("gyro-bias", "gyroscope", axis, 0.0, rate, rate, std, "rad/s", 1e-3, True)
+        for axis, rate, std in zip("xyz", np.radians((9.0, 5.0, 1.0)), np.radians((uncertain, 1.0, 1.0)), strict=True)
     ]
-    said = differing_numbers(SimpleNamespace(parameters=group))
-    assert [one.split()[2] for one in said] == named
+    assert groups_in_short(group) == [f"gyro bias by up to {size} °/s"]
 
 
 @pytest.mark.parametrize(("seen", "is_surplus"), [(3.3e-5, False), (-0.4e-5, True)])

@@ -8,7 +8,6 @@ from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table
-from trihedron.report.chart import Chart
 from trihedron.report.diagnosis_charts import (
     before_after_chart,
     forest_picture,
@@ -68,10 +67,11 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
     """Lay out a diagnosis; the first sections fit one screen. ``model`` names the file compared with the log,
     ``improved`` the scenario written with the parameters of the log."""
     sections = [Section("Result", _located(diagnosis))]
+    differing = [one for one in diagnosis.parameters if one.significant]
     if diagnosis.parameters:
-        differs = [one for one in diagnosis.parameters if one.significant] or differing_noise(diagnosis)
         about = (forest_picture(diagnosis.parameters), *differing_blocks(diagnosis), *_traces(diagnosis))
-        sections.append(Section("Parameters that differ" if differs else "Parameters of the model", about))
+        is_apart = differing or differing_noise(diagnosis)
+        sections.append(Section("Parameters that differ" if is_apart else "Parameters of the model", about))
     sections += [
         Section("Missing effects", (*effects_blocks(diagnosis), *effect_pictures(diagnosis))),
         Section("Unexplained", (Paragraph(_remaining(diagnosis)), *map(relation_facts, diagnosis.relations))),
@@ -105,20 +105,18 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         verdict=whole_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
-        lead=_lead(diagnosis, sections),
+        lead=forest_picture(diagnosis.parameters) if differing else worst_picture(diagnosis),
         next_step=next_step_in_words(diagnosis, model, improved),
         stated_level=level_of(diagnosis),
     )
     return beside_model(document, found) if found is not None and is_model else beside_reference(document, found)
 
 
-def _lead(diagnosis: Diagnosis, sections: Iterable[Section]) -> Picture | None:
-    """The picture of what disagrees most: parameters that differ, else the residual with the largest χ²."""
-    pictures = {one.name: one for section in sections for one in section.blocks if isinstance(one, Picture)}
-    if any(one.significant for one in diagnosis.parameters):
-        return pictures["forest"]
-    drawn = [one for one in diagnosis.domains if one.domain in pictures]
-    return pictures[max(drawn, key=lambda one: one.chi2_per_dof).domain] if drawn else None
+def worst_picture(diagnosis: Diagnosis) -> Picture | None:
+    """The residual of the domain with the largest χ², without and with the effects."""
+    chi2 = {one.domain: one.chi2_per_dof for one in diagnosis.domains}
+    worst = max(diagnosis.residuals, key=lambda one: chi2.get(one.domain, 0.0), default=None)
+    return None if worst is None else _picture(diagnosis, worst)
 
 
 def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -273,17 +271,14 @@ def effect_pictures(diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
+    """Residuals of one domain without and with the effects, with lines at poses that are not static."""
     caption = f"{_CAPTIONS[residuals.domain]} {_counted(residuals)}; ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares the rest of it."
-    return Picture(residuals.domain, caption, partial(residuals_chart, diagnosis, residuals))
-
-
-def residuals_chart(diagnosis: Diagnosis, residuals: DomainResiduals) -> Chart:
-    """Residuals of one domain without and with the effects, with lines at poses that are not static."""
     segments = getattr(diagnosis, "segments", None) if residuals.kind == "pose" else None
     lines = () if segments is None else pose_lines(segments, segments.time_mid_s)
-    return before_after_chart(residuals, has_effects=bool(diagnosis.effects), lines=lines)
+    chart = partial(before_after_chart, residuals, has_effects=bool(diagnosis.effects), lines=lines)
+    return Picture(residuals.domain, caption, chart)
 
 
 def _counted(residuals: DomainResiduals) -> str:

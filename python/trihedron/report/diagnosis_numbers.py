@@ -1,7 +1,7 @@
 """A given model compared with a recording: parameters and noise that differ, and prediction errors by stage."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from trihedron.arrays import TINY
 from trihedron.records.diagnosis import RELATIVE, Diagnosis, NoiseDifference, ParameterDifference, Stage
@@ -22,8 +22,8 @@ from trihedron.report.numbers import (
     with_unit,
 )
 
-NAMED_SIGMAS = 3.0
-"""Components of a differing group are listed from this many σ; the largest always is."""
+CLEAR_SIGMAS = 3.0
+"""Components of a differing group count for its size from this many σ; the most significant always does."""
 MOST_NUMBERS, MOST_NOISE = 3, 2
 """Most clauses about parameters and about noise in a headline; a table lists all."""
 LOGS = (".csv", ".npz", ".parquet")
@@ -32,29 +32,6 @@ _SENTENCES_FIRST = ("unit", "frame", "range", "rate")
 """Errors of every reading of a sensor, which come before its noise."""
 _SIZE = re.compile(r"(?<![\w.])\d[\d.]*(?:e[+−-]?\d+)?")
 _HEAD = ("parameter", "model", "recording", "recording − model", "p of its group")
-
-
-def differing_numbers(diagnosis: Diagnosis) -> list[str]:
-    """``gyro bias Z +0.31 ± 0.01 °/s`` for every parameter that differs."""
-    said = []
-    for members in _groups_that_differ(diagnosis).values():
-        said += [f"{id_in_print(f'{p.id}-{p.name}')} {_difference(p)}" for p in _clear(members)]
-        said += _remarks(members)
-    return said
-
-
-def _clear(members: list[ParameterDifference]) -> list[ParameterDifference]:
-    """The components of a differing group that are named."""
-    most = max(map(_in_sigmas, members))
-    return [p for p in members if _in_sigmas(p) >= min(NAMED_SIGMAS, most)]
-
-
-def _groups_that_differ(diagnosis: Diagnosis) -> dict[str, list[ParameterDifference]]:
-    groups: dict[str, list[ParameterDifference]] = {}
-    for p in diagnosis.parameters:
-        if p.significant:
-            groups.setdefault(p.id, []).append(p)
-    return groups
 
 
 def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -77,10 +54,7 @@ def _remarks(parameters: Iterable[ParameterDifference]) -> list[str]:
 
 
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:
-    """Differences for one sentence: every parameter if they are few, else groups with their largest member.
-
-    The most significant first; the others are counted.
-    """
+    """Differences for one sentence: groups of parameters and noise, the most significant first, others counted."""
     # A sentence about noise as a clause is cut at its first semicolon.
     clauses = {
         said: (together[0].lower() + together[1:]).split("; ")[0].rstrip(".")
@@ -88,9 +62,7 @@ def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     }
     whole = [clauses[_sentence(n)] for n in _noise_that_differs(diagnosis) if n.term in _SENTENCES_FIRST]
     noise = list(dict.fromkeys([*whole, *clauses.values()]))
-    numbers = [word for word in differing_numbers(diagnosis) if word not in _remarks(diagnosis.parameters)]
-    if len(numbers) > MOST_NUMBERS:
-        numbers = _groups_in_short(diagnosis)
+    numbers = groups_in_short(diagnosis.parameters)
     # Together with parameters, only noise terms that affect every reading of a sensor are listed.
     named = (whole if numbers else noise)[:MOST_NOISE]
     left, quieter = len(numbers) - MOST_NUMBERS, len(noise) - len(named)
@@ -109,14 +81,19 @@ def of_another_device(diagnosis: Diagnosis, model: str) -> str:
     return f"{which} calibration is of this sensor: {why}. " if why else ""
 
 
-def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
-    """Groups that differ, the most significant first, each with its largest significant member."""
+def groups_in_short(parameters: Sequence[ParameterDifference]) -> list[str]:
+    """Groups that differ, the most significant first, each with the largest of its components that clearly do."""
+    groups: dict[str, list[ParameterDifference]] = {}
+    for p in sorted(parameters, key=lambda p: p.p_value):
+        if p.significant:
+            groups.setdefault(p.id, []).append(p)
     said = []
-    for name, members in sorted(_groups_that_differ(diagnosis).items(), key=lambda group: group[1][0].p_value):
-        largest = max(_clear(members), key=lambda p: abs(p.difference))
+    for name, members in groups.items():
+        least = min(CLEAR_SIGMAS, max(map(_in_sigmas, members)))
+        largest = max((p for p in members if _in_sigmas(p) >= least), key=lambda p: abs(p.difference))
         scale, unit = in_print(largest)
         size = with_unit(plain_number(abs(scale * largest.difference), 2), unit)
-        said.append(f"{id_in_print(name)} by up to {size}")
+        said.append(f"{id_in_print(name)} by {'up to ' if len(members) > 1 else ''}{size}")
     return said
 
 
