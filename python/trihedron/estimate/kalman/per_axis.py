@@ -273,10 +273,6 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     observability = Observability(rank, 4, condition, values, weakest=name, advice=(advice,))
     if condition <= 30.0:
         return observability, []
-    weak = Finding.of(
-        "weakly-observable",
-        "kalman-sensitivity" if axis else "kalman-bias",
-        axis=axis,
-        condition=condition,
-    )
-    return observability, [weak]
+    return observability, [
+        Finding.of("weakly-observable", "attitudes", weakest=name, advice=advice, condition=condition)
+    ]

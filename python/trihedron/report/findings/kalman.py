@@ -48,15 +48,10 @@ ENTRIES = {
         "The start is too far away, or the poses do not determine the constants.",
         "Give a start near the data sheet, and poses in more directions.",
     ),
-    ("weakly-observable", "kalman-sensitivity", WARNING): Words(
-        "The attitudes determine the sensitivity to {axis:axis} {condition:.0f} times worse than the best one.",
+    ("weakly-observable", "attitudes", WARNING): Words(
+        "The attitudes determine the {weakest} {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
-        "Add poses that tilt {axis:axis} towards the vertical.",
-    ),
-    ("weakly-observable", "kalman-bias", WARNING): Words(
-        "The attitudes determine the bias {condition:.0f} times worse than the best one.",
-        "The poses do not turn every axis towards the vertical, both ways up.",
-        "Add poses with the axis of this bias up and down.",
+        "Add poses: {advice}.",
     ),
     ("noise-assumed", "", NOTE): Words(
         "Noise was taken from the scatter inside the poses; bias drift from pose to pose is not known.",
