@@ -9,7 +9,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.quantiles import MAD_TO_SIGMA, median, quantiles
-from trihedron.read.clock.losses import ahead, behind_late_rows, block_rows, lateness, track
+from trihedron.read.clock.losses import ahead, block_rows, lateness, track
 from trihedron.read.clock.period import STALL_STEPS, Period, find_period
 from trihedron.records.sampling import TimestampKind
 
@@ -88,14 +88,6 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
     unseen = max(UNSEEN * period, rounding)
     even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, (width, unseen), False, room)
     error = _error(time_s, even)
-    for _ in range(3 if counter is None and is_seen else 0):
-        # The fit is coarse here, because the clock must not follow the dip from a loss that is counted too early.
-        moved = behind_late_rows(tick, error, period)
-        if moved is tick:
-            break
-        tick = moved
-        even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, (width, unseen), False, room)
-        error = _error(time_s, even)
     if drifts:
         even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, (width, unseen), False, room, CLOSE_PIECES)
         error = _error(time_s, even)

@@ -7,17 +7,14 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.ranges import ranges_of
 from trihedron.read.clock.period import PAUSE_STEPS, STALL_STEPS
 
 LOST = 0.6
 """Permanent shift of the earliest timestamps, in periods, from which on a sample counts as lost."""
 MISS = 1e-2
 """Probability that some block of a whole log has no timestamp that is nearly undelayed."""
-SETTLED_OVER = 5
-"""Blocks on either side of a place from which the level of the earliest timestamps is estimated."""
-UNMOVED = LOST / (2.0 * SETTLED_OVER)
-"""Shift from block to block, in periods, of which ``2 SETTLED_OVER`` together are still no loss."""
+UNMOVED = 0.06
+"""Shift from block to block, in periods, that is a drift of the clock: ten of them together are still no loss."""
 
 
 def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
@@ -103,7 +100,7 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
 
     After the earliest row of the last block losses are counted only where all timestamps are accurate (``is_sharp``).
 
-    Returns the number of blocks that moved back by a period, and that of all blocks.
+    Returns how often blocks moved back by a period, and the number of all blocks.
     """
     at = _core.earliest_timestamps(late, width)
     first = late[at]
@@ -112,24 +109,39 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
         _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
         return 0, len(at)
     first = ahead(first, reach)
-    # Moves of less than a loss are drift of the clock.
-    moves = np.diff(first)
-    count = np.floor(moves + (1.0 - LOST)).astype(np.int64)
-    back = int(np.count_nonzero(moves < -LOST))
-    _settle(first, count)
+    count, level, back = _shifts(first)
     for j in np.flatnonzero(count > 0):
         a, b = int(at[j]), int(at[j + 1])
-        if b <= a:
-            continue
-        inside = late[a + 1 : b + 1] - first[j]
-        level = np.minimum.accumulate(inside[::-1])[::-1]
-        level[-1] = count[j]
-        whole = np.clip(np.floor(level + (1.0 - LOST)).astype(np.int64), 0, count[j])
-        whole[-1] = count[j]
-        whole = np.maximum.accumulate(whole)
-        lost[a + 1 : b + 1] += np.diff(whole, prepend=0)
+        if b > a:
+            _place(late[a + 1 : b + 1] - level[j], int(count[j]), lost[a + 1 : b + 1])
     _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
     return back, len(at)
+
+
+def _shifts(first: FloatArray) -> tuple[IntArray, FloatArray, int]:
+    """Samples lost behind each of the earliest timestamps (m,), in periods, but the last; the level (m - 1,) of the
+    clock there, less the losses before; and how often they moved back by a period.
+
+    The level follows a drift, but not the block that has no undelayed timestamp, or one that is early by chance.
+    """
+    count, levels = np.zeros(len(first) - 1, dtype=np.int64), np.zeros(len(first) - 1)
+    level, back, was_back = float(first[0]), 0, False
+    for j, value in enumerate(first[1:].tolist()):
+        moved = value - level
+        levels[j], count[j] = level, max(int(np.floor(moved + (1.0 - LOST))), 0)
+        is_back = moved < -LOST
+        back, was_back = back + (is_back and not was_back), is_back
+        level += int(count[j]) + min(max(moved - int(count[j]), -UNMOVED), UNMOVED)
+    return count, levels, back
+
+
+def _place(inside: FloatArray, count: int, lost: IntArray) -> None:
+    """Add ``count`` losses to rows (k,) that are late by ``inside`` (k,) about the clock before them; the last row is
+    behind all of them."""
+    level = np.minimum.accumulate(inside[::-1])[::-1]
+    whole = np.clip(np.floor(level + (1.0 - LOST)).astype(np.int64), 0, count)
+    whole[-1] = count
+    lost += np.diff(np.maximum.accumulate(whole), prepend=0)
 
 
 def _is_unmoved(first: FloatArray) -> bool:
@@ -144,52 +156,3 @@ def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: 
     if is_sharp and len(tail) > 1:
         whole = np.floor(np.minimum.accumulate(tail[::-1])[::-1] + (1.0 - LOST)).astype(np.int64)
         lost[at + 1 :] += np.diff(np.maximum(whole, 0))
-
-
-def _settle(first: FloatArray, count: IntArray) -> None:
-    """Correct ``count`` (m - 1,) where the earliest timestamps (m,), less the losses, stay shifted by a period.
-
-    A block without an undelayed timestamp splits a shift into two parts; one that is early by chance makes a false one.
-    """
-    m = SETTLED_OVER
-    for _ in range(3):
-        level = first - np.concatenate([[0], np.cumsum(count)])
-        if len(level) < 2 * m + 1:
-            return
-        middle = _core.running_median(level, m)
-        change = np.zeros(len(count))
-        change[m // 2 : len(count) - m // 2] = middle[m:] - middle[:-m]
-        far = np.abs(change) > LOST
-        if not far.any():
-            return
-        moved = False
-        for a, b in ranges_of(far):
-            by = int(np.rint(change[a:b][np.argmax(np.abs(change[a:b]))]))
-            at = a + int(np.argmax(np.diff(level)[a:b] if by > 0 else count[a:b]))
-            by = max(by, -int(count[at]))
-            count[at] += by
-            moved |= by != 0
-        if not moved:
-            return
-
-
-def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArray:
-    """Ticks with each loss moved after the rows whose timestamps it would make earlier than their samples.
-
-    A row before a loss that is late by most of a period looks like a row after it; its ``error`` (n,) [s] relative to
-    the even clock is then negative.
-    """
-    parts = range(1, len(tick), 1 << 18)
-    at = np.concatenate([a + np.flatnonzero(np.diff(tick[a - 1 : a + (1 << 18)]) > 1) for a in parts])
-    if not len(at):
-        return tick
-    early = -0.1 * period
-    shift = np.zeros_like(tick)
-    moved = False
-    for i in at:
-        k, count = int(i), int(tick[i] - tick[i - 1] - 1)
-        while k < len(tick) and k < i + STALL_STEPS and error[k] < early and (k == i or tick[k] == tick[k - 1] + 1):
-            shift[k] += count
-            k += 1
-        moved = moved or k > int(i)
-    return np.subtract(tick, shift, out=shift) if moved else tick
