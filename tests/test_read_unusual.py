@@ -281,3 +281,26 @@ def test_devices_side_by_side_are_identified_by_the_names_of_their_columns(tmp_p
     if devices[0] == "A" and form.startswith("{d}"):
         with pytest.raises(ReadError, match=r"identify 2 devices: A, B; .*--instance 'A'"):
             read_recording(log)
+
+
+@pytest.mark.parametrize("with_rates", [False, True])
+def test_columns_called_g_that_are_gravity_in_every_pose_are_a_force_and_no_gyro(tmp_path, with_rates):
+    force = np.round(FORCE / 9.80665, 4)
+    names = "t,gx,gy,gz," + ("rotX,rotY,rotZ" if with_rates else "mx,my,mz")
+    recording = read_recording(texts.written(tmp_path / "log.csv", *texts.table(T, force, RATE), header=names))
+    np.testing.assert_allclose(recording.accelerometer, force, atol=1e-6)
+    assert (recording.gyroscope is not None) == with_rates
+    assert "columns-assumed" in doubts(recording)
+    # A gyro of the same names turns the gravity of the accelerometer, or has no length that every pose has.
+    assert "columns-assumed" not in doubts(read_recording(stated(tmp_path / "both.csv", T, f"t,{NAMES}")))
+
+
+def test_a_clock_whose_name_two_other_clocks_contradict_is_in_the_unit_that_they_show(tmp_path):
+    # As librealsense names the microseconds of a camera.
+    ms = np.rint(1000.0 * T).astype(int)
+    clocks = [f"{1000 * t},{1709294400000 + t},{1709294400003 + t}" for t in ms]
+    names = f"HW Timestamp (ms),Backend Timestamp (ms),Host Timestamp (ms),{NAMES}"
+    recording = read_recording(stated(tmp_path / "log.csv", clocks, names))
+    assert recording.rate_hz == pytest.approx(50.0, rel=1e-6)
+    assert "2 other clocks" in next(f.seen for f in recording.findings if f.code == "time-unit-detected")
+    assert read_recording(tmp_path / "log.csv", time_unit="ms").rate_hz == pytest.approx(0.05, rel=1e-6)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from makers.layout import nanoseconds, text, written
+from hand_made_sessions import G
+from makers.layout import SI, Layout, layout, nanoseconds, session, text, written
 
 
 def _padded(value: float) -> str:
@@ -61,3 +62,33 @@ def ros2_topic_echo_csv(s, a, w):
     ns = np.array(nanoseconds(s))
     zero = [np.zeros(s.n)] * 9
     return written(ns // 10**9, ns % 10**9, ["imu"] * s.n, *zero[:3], zero[0] + 1, *zero, *w.T, *zero, *a.T, *zero)
+
+
+@layout
+def motioncal():
+    """Adafruit's sketches for MotionCal: ``Raw:`` (8192 per g, 16 per deg/s), ``Uni:`` and now and then ``Cal1:``."""
+    s = session(50)
+    a, w = np.rint(8192 * s.force / G).astype(int), np.rint(16 * np.degrees(s.rate)).astype(int)
+    field, out = (212, -85, 431), []
+    for k in range(s.n):
+        out.append("Raw:" + ",".join(map(str, (*a[k], *w[k], *field))))
+        out.append(
+            "Uni:"
+            + ",".join([*(f"{v:.2f}" for v in s.force[k]), *(f"{v:.4f}" for v in s.rate[k]), "21.20,-8.50,43.10"])
+        )
+        out += ["Cal1:0.000,0.000,0.000,0.000,0.000,0.000,1.200,-3.400,0.500,48.000"] if k % 50 == 49 else []
+    text = ("\n".join(out) + "\n").encode()
+    options = {"rate_hz": 50.0}
+    return Layout("MotionCal", {"motioncal.txt": text}, 50, a, w, ("counts", "counts"), len(out), options)
+
+
+@layout
+def realsense():
+    """librealsense's rs-convert -p: a table of each stream with names above, the kind of stream first in each row."""
+    s = session(200)
+    a, w = np.round(s.force, 3), np.round(s.rate, 3)
+    head = "\n\nStream Type,F#,HW Timestamp (ms),Backend Timestamp(ms),Host Timestamp(ms),3DOF_x,3DOF_y,3DOF_z\n"
+    ms = np.round(1000.0 * s.time_s).astype(int)
+    clocks = [np.arange(s.n) + 17, 5120 + ms, 1709294400003 + ms, 1709294400004 + ms]
+    body = "".join(head + written([kind] * s.n, *clocks, *v.T) for kind, v in (("Accel", a), ("Gyro", w)))
+    return Layout("RealSense (rs-convert)", {"imu_pose.csv": body.encode()}, 200, a, w, SI, 2 * s.n, {}, False, True)

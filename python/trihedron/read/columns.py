@@ -12,7 +12,7 @@ from trihedron.read.clock.unit import TICKS
 from trihedron.read.errors import ReadError
 from trihedron.read.names import ColumnName, parse_name
 from trihedron.read.table import Table
-from trihedron.read.unnamed import are_nanoseconds, by_values
+from trihedron.read.unnamed import are_nanoseconds, by_values, is_force
 from trihedron.records import Finding
 
 Sensor = Literal["accelerometer", "gyroscope"]
@@ -103,6 +103,11 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     else:
         meanings = said
     triads = {role: _ranked(meanings, role) for role in SENSORS}
+    if sensor is None and (forces := [t for t in triads["gyroscope"] if _is_force(table, meanings, triads, t)]):
+        triads["gyroscope"] = [triad for triad in triads["gyroscope"] if triad not in forces]
+        is_read, taken = not triads["accelerometer"], " ".join(map(table.label, forces[0]))
+        triads["accelerometer"] = triads["accelerometer"] or forces
+        findings.append(Finding.of("columns-assumed", "force", taken=taken, is_accelerometer=is_read))
     if not triads["accelerometer"] and triads["gyroscope"]:
         triads["accelerometer"] = _ranked(meanings, "translation")  # tx ty tz beside wx wy wz
     if not any(triads.values()):
@@ -197,8 +202,9 @@ def _by_place(table: Table, known: Meanings, sensor: Sensor | None, findings: li
 
 
 def _bare(table: Table, meanings: Meanings, sensor: Sensor | None, findings: list[Finding]) -> Meanings:
-    """Columns named only ``x``, ``y``, ``z``, as those of the sensor that the file or their unit names."""
-    bare = _triads(meanings, "bare")
+    """Columns named only ``x``, ``y``, ``z``, as those of the sensor that the file or their unit names; of a table of
+    one sensor, also with a word that says nothing."""
+    bare = _triads(meanings, "bare") or (_triads(meanings, "") if table.sensor else [])
     if not bare:
         return {}
     by_unit = [one for one in SENSORS if meanings[bare[0][0]].unit_for(one)]
@@ -244,6 +250,15 @@ def _ranked(meanings: Meanings, role: str) -> list[Triad]:
     return [] if best is None else [best, *(triad for triad in groups if triad != best)]
 
 
+def _is_force(table: Table, meanings: Meanings, triads: dict[Sensor, list[Triad]], triad: Triad) -> bool:
+    """Whether columns that are a gyro by the letter g alone are gravity by their values."""
+    meaning = meanings[triad[0]]
+    if meaning.unit or meaning.group.partition("|")[0].split()[-1:] != ["g"]:
+        return False
+    time = next((i for i, one in meanings.items() if one.role == "time"), None)
+    return is_force(table, triad, next(iter(triads["accelerometer"]), None), time)
+
+
 def _unit(table: Table, meanings: Meanings, sensor: str, triad: Triad) -> str:
     """The unit of a sensor: from the names, else from a remark above the table."""
     units = (meanings[i].unit for i in triad if meanings[i].role == sensor and meanings[i].unit)
@@ -255,6 +270,8 @@ def _clock_columns(table: Table, meanings: Meanings, said: Meanings, mapping: st
     counter of a format."""
     # A program may write an empty column for a clock that it does not have.
     times = [i for i, m in meanings.items() if m.role == "time" and (i in said or np.isfinite(table.columns[i]).any())]
+    # Or a constant.
+    times = [i for i in times if i in said or table.columns[i][0] != table.columns[i][-1]] or times
     time = max(times, key=lambda i: (meanings[i].rank, -i), default=None)
     found: dict[str, Any] = {"nanoseconds": _nanoseconds_beside(table, time)}
     unit = "" if time is None else meanings[time].time_unit

@@ -19,7 +19,7 @@ from trihedron.read.names import is_rate
 from trihedron.read.repeated_rows import without_repeated_rows
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Options, Table
-from trihedron.read.time_column import reject_unread_time, summed_steps, with_arrivals
+from trihedron.read.time_column import agreed_unit, reject_unread_time, summed_steps, with_arrivals
 from trihedron.records import Finding, Sampling, Severity
 from trihedron.records.sampling import UNJUDGED
 from trihedron.records.words import Words, words
@@ -211,6 +211,9 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
         findings += stated
     if named == "100us" and not table.clock.unit:
         named = _sample_time_fine(table, chosen.time, findings)
+    if not table.clock.unit and given is None:
+        named, said = agreed_unit(table, chosen.time, named)
+        findings += said
     timed = with_arrivals(table, chosen.time)
     clock = build_clock(timed, chosen.time, named, given, chosen.nanoseconds, _witness(table, chosen))
     findings += clock.findings

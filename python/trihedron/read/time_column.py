@@ -7,6 +7,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.arrivals import paced
+from trihedron.read.clock.unit import SECONDS, seconds_of
 from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
@@ -25,6 +26,29 @@ def summed_steps(table: Table, chosen: Columns) -> tuple[Table, Columns]:
         table = replace(table, columns=columns, findings=(*table.findings, note))
         return table, replace(chosen, time=i, time_unit=parsed.time_unit)
     return table, chosen
+
+
+ALIKE = 0.05
+"""Largest relative difference of the spans of clocks that measure the same time."""
+
+
+def agreed_unit(table: Table, time: int, named: str) -> tuple[str, tuple[Finding, ...]]:
+    """The unit that a time column is ``named`` in, or, stated by a finding, the one in which it lasts as long as two or
+    more other clocks of the log do by their names."""
+    parsed = [parse_name(name) for name in table.names or ()]
+    spans = [
+        seconds_of(one.time_unit) * float(column[-1] - column[0])
+        for i, (one, column) in enumerate(zip(parsed, table.columns, strict=False))
+        if i != time and one.role == "time" and len(column) and column[-1] > column[0]
+    ]
+    own = float(table.columns[time][-1] - table.columns[time][0])
+    if len(spans) < 2 or not (own > 0.0 and max(spans) < (1.0 + ALIKE) * min(spans)):
+        return named, ()
+    unit = next((one for one, size in SECONDS.items() if abs(size * own / spans[0] - 1.0) < ALIKE), named)
+    if unit == named or not own * seconds_of(named) > 0.0:
+        return named, ()
+    column, count = table.label(time), len(spans)
+    return unit, (Finding.of("time-unit-detected", "other-clocks", column=column, named=named, count=count, unit=unit),)
 
 
 def with_arrivals(table: Table, time: int) -> Table:

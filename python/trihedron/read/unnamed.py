@@ -67,6 +67,20 @@ def by_values(table: Table, columns: list[int], time: int | None) -> tuple[Roles
     return roles, (note,)
 
 
+def is_force(table: Table, triad: tuple[int, ...], accelerometer: tuple[int, ...] | None, time: int | None) -> bool:
+    """Whether columns have the length of gravity in several poses and do not turn it, as a gyro's would that of the
+    ``accelerometer``."""
+    triads = [triad] if accelerometer is None else [triad, accelerometer]
+    columns = [[table.columns[i][:_ROWS] for i in one] for one in triads]
+    if not all(len(axis) >= _FEWEST_ROWS for axes in columns for axis in axes):
+        return False
+    readings = [np.stack(axes, axis=1) for axes in columns]
+    rate = _ROWS_A_SECOND if time is None else _rows_a_second(table.columns[time][:_ROWS])
+    if not _is_gravity(readings[0], rate):
+        return False
+    return accelerometer is None or _correlation(readings[1], readings[0], rate) < CLEAR_CORRELATION
+
+
 def _axes(sensor: str, triad: tuple[int, ...] | list[int]) -> Roles:
     return {i: ColumnName(sensor, axis, "by values") for i, axis in zip(triad, "xyz", strict=True)}
 

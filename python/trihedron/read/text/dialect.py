@@ -238,24 +238,37 @@ _WORD = re.compile(r"\$?[^\W\d]\w*:?$")
 _SECOND = re.compile(r"[-+.\d]+[,;\t ]\s*[^\W\d]\w*[,;\t ]")
 
 
+def has_records(head: str) -> bool:
+    """Whether the first lines have record types, one of a sensor among them: those of the other may come far behind."""
+    _, _, words = _separator(head.split("\n")[:_MOST_RECORDS_SEEN])
+    return any(pick_kind(words, kind) is not None for kind in SENSORS)
+
+
 def split_records(text: str) -> tuple[dict[str, Rewritten], dict[str, int]] | None:
     """The lines of ``accelerometer`` and ``gyroscope``, each with its header; and the number of lines by record type.
 
     None where the record types do not identify both sensors.
     """
     lines = text.split("\n")
-    separator, place = _separator(lines[:_MOST_RECORDS_SEEN])
+    separator, place, _ = _separator(lines[:_MOST_RECORDS_SEEN])
     if not separator:
         return None
     rows: dict[str, list[int]] = {}
     headers: dict[str, int] = {}
+    above = (0, 0)
     for i, line in enumerate(lines):
         fields = split(line.lstrip("#%/ \t"), separator)
-        word = fields.pop(place) if len(fields) > place else ""
+        n_fields, word = len(fields), fields.pop(place) if len(fields) > place else ""
+        is_header = not any(is_number(field, False) for field in fields)
+        if fields and is_header:
+            above = n_fields, i
         if fields and _WORD.match(word):
-            if not any(is_number(field, False) for field in fields):
+            if is_header:
                 headers.setdefault(word, i)
             elif not line.startswith(("#", "%", "/")):
+                if word not in rows and above[0] == n_fields:
+                    # The names above the first row of its kind, where they do not repeat the kind.
+                    headers.setdefault(word, above[1])
                 rows.setdefault(word, []).append(i)
     words = {kind: pick_kind(list(rows), kind) or "" for kind in SENSORS}
     if len(rows) > _MOST_LABELS or any(len(rows.get(word, ())) < 2 for word in words.values()):
@@ -267,19 +280,19 @@ def split_records(text: str) -> tuple[dict[str, Rewritten], dict[str, int]] | No
     return out, {word: len(held) for word, held in rows.items()}
 
 
-def _separator(lines: list[str]) -> tuple[str, int]:
-    """The separator of lines with a record type and three or more numbers, and the type's place; "" where most lines
-    are not such lines."""
+def _separator(lines: list[str]) -> tuple[str, int, list[str]]:
+    """The separator of lines with a record type and three or more numbers, the type's place, and the types; "" where
+    most lines are not such lines."""
     lines = [line for line in lines if line.strip() and not line.startswith(("#", "%"))]
     place = int(sum(_SECOND.match(line) is not None for line in lines[:_FEW]) > 0.5 * len(lines[:_FEW]))
     if not place and sum(line[0].isalpha() or line[0] in "$_" for line in lines) < max(4.0, 0.3 * len(lines)):
-        return "", 0
+        return "", 0, []
     for separator in (",", ";", "\t", " "):
         rows = [split(line, separator) for line in lines]
         fitting = [
             r for r in rows if len(r) >= 4 and _WORD.match(r[place]) and sum(is_number(f, False) for f in r) >= 3
         ]
-        is_ragged = not place or len({len(r) for r in fitting}) > 1
-        if len(fitting) >= max(4.0, 0.5 * len(rows)) and len({r[place] for r in fitting}) >= 2 and is_ragged:
-            return separator, place
-    return "", 0
+        is_ragged, words = not place or len({len(r) for r in fitting}) > 1, [r[place] for r in fitting]
+        if len(fitting) >= max(4.0, 0.5 * len(rows)) and is_ragged:
+            return separator, place, list(dict.fromkeys(words))
+    return "", 0, []

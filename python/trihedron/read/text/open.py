@@ -7,7 +7,7 @@ from trihedron.read.errors import ReadError, reject_after_fork
 from trihedron.read.memory import check_memory
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import as_plain
-from trihedron.read.text.dialect import Rewritten, rewrite, split_records
+from trihedron.read.text.dialect import Rewritten, has_records, rewrite, split_records
 from trihedron.read.text.json_log import is_json, of_json
 from trihedron.read.text.makers import makers
 from trihedron.read.text.reader import TextReader
@@ -37,7 +37,7 @@ def read_text(path: Path, data: bytes, sha256: str, progress: Progress | None) -
 
     if is_json(head):
         return (table_of(of_json(path, whole())),)
-    if split_records(head) is not None and (found := split_records(whole())) is not None:
+    if has_records(head) and (found := split_records(whole())) is not None:
         return _of_records(path, {kind: table_of(part) for kind, part in found[0].items()}, found[1])
     for dialect in (*makers(), rewrite):
         if dialect(head) is not None and (rewritten := dialect(whole())) is not None:

@@ -75,6 +75,12 @@ _TIMESTAMPS = {
         "Xsens MTi does}.",
         action="Give --time-unit if this is wrong.",
     ),
+    ("time-unit-detected", "other-clocks", NOTE): Words(
+        "The name of the time column {column} says {named:unit}, but {count} other clocks of the log agree that it is "
+        "in {unit:unit}, in which it was read.",
+        "A program that names a clock of its device in the unit of its own.",
+        "If the name is right, give --time-unit {named}.",
+    ),
     ("time-unit-detected", "sum-of-steps", NOTE): Words(
         "Column {column} contains the time since the row before; the time is their sum.",
         action="If it is something else, read with --columns time=none and --rate.",

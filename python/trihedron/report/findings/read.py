@@ -104,6 +104,12 @@ _COLUMNS = {
         "--accel.",
         or_severity=SERIOUS,
     ),
+    ("columns-assumed", "force", WARNING): Words(
+        "Columns {taken} have the length of gravity in every pose, so they are no gyro"
+        "{is_accelerometer:?: they were taken as the accelerometer|, and were not read}.",
+        "Their letter stands for a force in g.",
+        "If they are a gyro, name all columns with --columns, as in time=1,gx=2,gy=3,gz=4.",
+    ),
     ("columns-assumed", "one-of-several", WARNING): Words(
         "More than one triad could be the {sensor}: {taken} was taken, {others:&; } not used.",
         "The log contains raw and corrected readings, or several devices.",
