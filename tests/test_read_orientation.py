@@ -65,3 +65,22 @@ def test_moves_so_slow_that_gravity_hardly_changes_in_a_tenth_of_a_second_change
     assert not [f for f in found if f.severity is Severity.SERIOUS]
     # One interval for each pose: the first, and one after every move.
     assert len(Intervals(force, 50.0).edges) == 15
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gravity_that_leaps_from_one_sample_to_the_next_is_said_with_its_place(seed):
+    t, force, rate = motion(50.0, seed, n_poses=14)
+    at = next(k for k in range(len(t) // 2, len(t)) if np.ptp(force[k - 40 : k + 40], axis=0).max() < 0.5)
+    for turned in (FLIP_Y @ EXCHANGE, EXCHANGE @ FLIP_Y):
+        # Both sensors: the driver was started anew with other axes.
+        both = [np.concatenate([one[:at], one[at:] @ turned.T]) for one in (force, rate)]
+        found = trihedron.read({"time_s": t, "acc": both[0], "gyr": both[1]}).findings
+        (said,) = [one for one in found if one.code == "axes-changed"]
+        assert said.numbers["sample"] == at
+    # Rows that were cut out, and the time written anew.
+    kept = np.r_[0:at, at + 200 : len(t)]
+    found = trihedron.read({"time_s": t[: len(kept)], "acc": force[kept], "gyr": rate[kept]}).findings
+    assert [one.numbers["sample"] for one in found if one.code == "axes-changed"] == [at]
+    # With the time of the rows the clock misses them.
+    found = trihedron.read({"time_s": t[kept], "acc": force[kept], "gyr": rate[kept]}).findings
+    assert "axes-changed" not in {one.code for one in found}

@@ -5,17 +5,19 @@ import os
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.columns import SENSORS
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.table import Table
+from trihedron.read.text.cells import labels_of
 
 BYTES_PER_CELL_AT_PEAK = 16
 """A number (8 bytes), and its share of the clock's timestamps and ticks and of the memory of one pass of the audit:
@@ -207,6 +209,7 @@ def columns_table(kind: str, items: list[tuple[Any, Any]], sha256: str = "") -> 
     names: list[str] = []
     columns: list[FloatArray] = []
     words: dict[int, str] = {}
+    labels: dict[int, tuple[tuple[str, ...], IntArray]] = {}
     metadata: dict[str, str] = {}
     of_blocks: set[int] = set()
     for key, value in items:
@@ -214,8 +217,10 @@ def columns_table(kind: str, items: list[tuple[Any, Any]], sha256: str = "") -> 
         array = np.ma.asanyarray(value) if isinstance(value, np.ma.MaskedArray) else np.asanyarray(value)
         if array.ndim == 0:
             metadata[name] = str(array)
-        elif array.ndim == 1 and array.dtype.kind in "OUS" and not _is_numeric_object(array):
+        elif array.ndim == 1 and array.dtype.kind in "OUSV" and not _is_numeric_object(array):
             words[len(names)] = str(array[0]) if len(array) else ""
+            if (found := labels_of([None if cell is None else str(cell) for cell in array])) is not None:
+                labels[len(names)] = found
             names.append(name)
             columns.append(np.empty(0))
         elif array.ndim == 1:
@@ -243,7 +248,8 @@ def columns_table(kind: str, items: list[tuple[Any, Any]], sha256: str = "") -> 
         raise ReadError(f"{kind}: there is no column of numbers in it.")
     if not any(parse_name(name).role in SENSORS for name in names):
         names = ["" if i in of_blocks else name for i, name in enumerate(names)]
-    return _table(kind, tuple(names) if any(names) else None, tuple(columns), words, metadata, sha256)
+    table = _table(kind, tuple(names) if any(names) else None, tuple(columns), sha256)
+    return replace(table, metadata=metadata, words=words, labels=labels)
 
 
 def _is_numeric_object(array: npt.NDArray[Any]) -> bool:
@@ -281,15 +287,8 @@ def _seconds(timestamps: npt.NDArray[Any]) -> FloatArray:
     return seconds
 
 
-def _table(
-    kind: str,
-    names: tuple[str, ...] | None,
-    columns: tuple[FloatArray, ...],
-    words: dict[int, str] | None = None,
-    metadata: dict[str, str] | None = None,
-    sha256: str = "",
-) -> Table:
+def _table(kind: str, names: tuple[str, ...] | None, columns: tuple[FloatArray, ...], sha256: str = "") -> Table:
     digest = hashlib.sha256()
     for column in () if sha256 else columns:
         digest.update(column.tobytes())
-    return Table(Path(f"<{kind}>"), names, columns, sha256 or digest.hexdigest(), metadata or {}, words=words or {})
+    return Table(Path(f"<{kind}>"), names, columns, sha256 or digest.hexdigest())

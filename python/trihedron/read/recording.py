@@ -17,7 +17,7 @@ from trihedron.channel_facts.quiet import Windows, look
 from trihedron.read.audit.invalid import without_invalid
 from trihedron.read.audit.motionless import audit_motionless_accelerometer, audit_motionless_gyro
 from trihedron.read.audit.orientation import audit_orientation
-from trihedron.read.audit.readings import audit_readings, audit_seam
+from trihedron.read.audit.readings import audit_readings
 from trihedron.read.audit.timing import audit_counter, audit_pace, audit_timing
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.unit import was_weighed, with_gyro
@@ -37,8 +37,6 @@ from trihedron.records import Finding, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
-ONE_SETTING = ("unit-contradicted", "axes-changed")
-"""Findings about the units and axes of a sensor whose settings do not change."""
 TIMESTAMPS = "logged time after the first [s]"
 """Auxiliary column with the logged timestamps, where an even clock replaces them."""
 
@@ -152,8 +150,8 @@ def _audited(
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
     changes = audit_orientation(sensors, rate)
     if changes:
-        # A scale or axes that change have no one unit, and gravity leaps where they do.
-        findings = [*changes, *(one for one in findings if one.code not in ONE_SETTING)]
+        # A scale or axes that change have no one unit.
+        findings = [*changes, *(one for one in findings if one.code != "unit-contradicted")]
     findings += of_clock
     facts = facts_in(present, windows, extremes)
     for done, (name, triad) in enumerate(present.items()):
@@ -210,8 +208,6 @@ def _judged_gyro(
         is_stated and clear is not None and judged.unit is not RateUnit.COUNTS and turning.fits(RateUnit(judged.unit))
     )
     changed = _exchanged(sensors, rate_hz) if clear is None else []
-    if clear is not None and acc is not None:
-        changed = audit_seam(sensors.time_s, acc, sensors.gyroscope, clear, sensors.place)
     if clear is not None and clear.motionless:
         is_one_file = sensors.columns.gyroscope is not None
         without_gyro = replace(sensors.columns, gyroscope=None).mapping() if is_one_file else ""

@@ -2,7 +2,7 @@
 
 The most likely sequence of states (Viterbi). The gyro's are its scale and the order and signs of its axes, which
 predict how gravity turns between intervals in which it is constant; the accelerometer's is its scale, which predicts
-its norm there.
+its norm there. Axes of both sensors that change together predict nothing new, but gravity leaps there.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ STEADY = 0.02
 """Largest change over the shortest of such intervals, as a fraction of gravity."""
 FEW = 3
 """Blocks of an interval that are averaged beside a move."""
+LEAP, SEEN = 0.35, 0.25
+"""Least leap of the direction of gravity [rad], and the largest part of it that the gyro may have measured."""
 LEVELS = (0.1, 0.5, 0.9)
 """Quantiles of the norms at which a scale is looked for."""
 PROPER = np.array(
@@ -68,6 +70,9 @@ def audit_orientation(sensors: Sensors, rate_hz: float) -> list[Finding]:
     if sensors.gyroscope is not None:
         scales = _scales(sensors.accelerometer, sensors.gyroscope, rate_hz)
         findings += [_finding("gyro", change, sensors) for change in changed_axes(found, sensors.gyroscope, scales)]
+        at = [] if findings else leaps(found, sensors, scales)
+        if at:
+            findings.append(Finding.of("axes-changed", "leap", count=len(at), where=sensors.place(at[0]), sample=at[0]))
     return findings
 
 
@@ -157,7 +162,7 @@ class Intervals:
     def __init__(self, accelerometer: FloatArray, rate_hz: float) -> None:
         self.length = max(1, round(BLOCK_S * rate_hz))
         self.step_s = self.length / rate_hz
-        force = self.blocks(accelerometer)
+        force = self.force = self.blocks(accelerometer)
         norm = np.linalg.norm(force, axis=1)
         self.up = force / np.where(norm > 0.0, norm, np.nan)[:, None]
         self.calm = self._edges(force, norm, 0)
@@ -242,6 +247,28 @@ def changed_axes(found: Intervals, gyroscope: FloatArray, scales: list[float]) -
                 tuple(int(s) for s in turn[range(3), order]),
             )
         )
+    return out
+
+
+def leaps(found: Intervals, sensors: Sensors, scales: list[float]) -> list[int]:
+    """Samples at which gravity turns at once, between intervals in which it is constant, without a rotation that the
+    gyro reads or samples that the clock misses: the axes of both sensors changed, or rows were cut out."""
+    accelerometer, gyroscope, length = sensors.accelerometer, sensors.gyroscope, found.length
+    if accelerometer is None or gyroscope is None or not scales or length < 2:
+        return []
+    out, turned = [], found.blocks(gyroscope) * found.step_s
+    for before, after in zip(found.calm[:-1, 1].tolist(), found.calm[1:, 0].tolist(), strict=True):
+        rows = slice(before * length, (after + 1) * length)
+        turn = float(np.linalg.norm(found.up[after] - found.up[before]))
+        apart = abs(math.log(np.linalg.norm(found.force[after]) / np.linalg.norm(found.force[before])))
+        if after - before > 2 or turn < LEAP or apart > ALIKE:
+            continue
+        rest = 0.5 * (turned[before] + turned[after])
+        seen = scales[0] * float(np.linalg.norm(turned[before : after + 1] - rest, axis=1).sum())
+        time_s = sensors.time_s[rows]
+        if seen < SEEN * turn and time_s[-1] - time_s[0] < (len(time_s) - 0.5) / length * found.step_s:
+            step = np.linalg.norm(np.diff(accelerometer[rows], axis=0), axis=1)
+            out.append(rows.start + 1 + int(np.nanargmax(step)))
     return out
 
 

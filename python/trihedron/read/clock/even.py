@@ -82,7 +82,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         tick, pauses, moved_back, is_seen = counter, np.zeros(0, np.int64), 0.0, True
         period = _long_run(time_s, counter)
     else:
-        period, tick, pauses, moved_back = track(time_s, period, width, is_seen, found.coherence > 0.9, room)
+        period, tick, pauses, moved_back = track(time_s, period, width, is_seen, room)
     # Rounding to a grid moves a difference of two timestamps by its step / √6 rms, at any lag.
     rounding = found.grid_s / np.sqrt(6.0) if is_seen and found.grid_s < period else 0.0
     unseen = max(UNSEEN * period, rounding)

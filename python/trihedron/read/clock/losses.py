@@ -50,7 +50,7 @@ def ahead(values: FloatArray, reach: int) -> FloatArray:
 
 
 def track(
-    time_s: FloatArray, period: float, width: int, is_seen: bool, is_sharp: bool, room: FloatArray
+    time_s: FloatArray, period: float, width: int, is_seen: bool, room: FloatArray
 ) -> tuple[float, IntArray, IntArray, float]:
     """Period, tick of every row, pauses, and the share of blocks that moved back by a period; ``room`` (n,): buffer.
 
@@ -80,7 +80,7 @@ def track(
     for a, b in pairwise(edges):
         if not is_seen or b - a < 2 * width:
             continue
-        moved_back, n_blocks = _count_losses(late[a:b], width, reach, is_sharp, lost[a:b])
+        moved_back, n_blocks = _count_losses(late[a:b], width, reach, lost[a:b])
         back, blocks = back + moved_back, blocks + n_blocks
     for a, k in zip(edges, pauses, strict=False):
         # The samples lost in a pause are known from its length alone, of which a late delivery comes back.
@@ -95,10 +95,10 @@ def track(
     return period, tick, pauses, back / max(blocks, 1)
 
 
-def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost: IntArray) -> tuple[int, int]:
+def _count_losses(late: FloatArray, width: int, reach: int, lost: IntArray) -> tuple[int, int]:
     """Write the number of samples lost before each row of one section into ``lost``; ``late`` is in periods.
 
-    After the earliest row of the last block losses are counted only where all timestamps are accurate (``is_sharp``).
+    After the earliest row of the last block none is counted: rows that are late look like rows behind a loss.
 
     Returns how often blocks moved back by a period, and the number of all blocks.
     """
@@ -106,7 +106,6 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
     first = late[at]
     if _is_unmoved(first):
         # Minima over neighbours do not move further either, so nothing is lost.
-        _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
         return 0, len(at)
     first = ahead(first, reach)
     count, level, back = _shifts(first)
@@ -114,7 +113,6 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
         a, b = int(at[j]), int(at[j + 1])
         if b > a:
             _place(late[a + 1 : b + 1] - level[j], int(count[j]), lost[a + 1 : b + 1])
-    _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
     return back, len(at)
 
 
@@ -148,11 +146,3 @@ def _is_unmoved(first: FloatArray) -> bool:
     """Whether all earliest timestamps (m,), in periods, are within ``UNMOVED`` of the previous one."""
     count, _, _, least, most = _core.inside_steps(first, -np.inf, np.inf)
     return 0 < count == len(first) - 1 and max(-least, most) <= UNMOVED
-
-
-def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: IntArray) -> None:
-    """Write the samples lost after row ``at``, the earliest of the last block, into ``lost``."""
-    tail = late[at:] - level
-    if is_sharp and len(tail) > 1:
-        whole = np.floor(np.minimum.accumulate(tail[::-1])[::-1] + (1.0 - LOST)).astype(np.int64)
-        lost[at + 1 :] += np.diff(np.maximum(whole, 0))

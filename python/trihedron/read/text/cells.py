@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
 
 # polars is imported where it is used: the import takes longer than reading a short log, and most logs do not need it.
 
-JUDGED = 200
-"""Cells from which it is determined whether a column contains dates or words."""
 MAX_WORDS = 64
 """Largest number of distinct words of a column that may identify sensors or devices; with more it is text."""
+JUDGED = 200
+"""Cells from which it is determined whether a column contains dates or words."""
 
 
 @dataclass
@@ -55,15 +56,22 @@ class TextColumn:
             return np.asarray(time_s + _DAY_S * np.cumsum(step < -0.5 * _DAY_S), dtype=np.float64)
 
     def labels(self) -> tuple[tuple[str, ...], IntArray] | None:
-        """Distinct words in order, and the index (n,) of each row's word; None where too many are distinct."""
+        """As :func:`labels_of`, of all cells."""
         import polars as pl
 
-        text = pl.concat(self.cells).fill_null("").str.strip_chars(' "')
-        words = text.unique(maintain_order=True).to_list()
-        if len(words) > MAX_WORDS:
-            return None
-        codes = text.replace_strict(words, list(range(len(words))), return_dtype=pl.Int64)
-        return tuple(words), np.asarray(codes.to_numpy(), dtype=np.int64)
+        return labels_of(pl.concat(self.cells))
+
+
+def labels_of(cells: Sequence[str | None] | pl.Series) -> tuple[tuple[str, ...], IntArray] | None:
+    """Distinct words of cells in order, and the index (n,) of each one's word; None where too many are distinct."""
+    import polars as pl
+
+    text = pl.Series(cells, dtype=pl.String).fill_null("").str.strip_chars(' "')
+    words = text.unique(maintain_order=True).to_list()
+    if len(words) > MAX_WORDS:
+        return None
+    codes = text.replace_strict(words, list(range(len(words))), return_dtype=pl.Int64)
+    return tuple(words), np.asarray(codes.to_numpy(), dtype=np.int64)
 
 
 def parse(path: Path, data: bytes, layout: Layout, first_line: int) -> list[pl.Series]:

@@ -167,7 +167,6 @@ _COLUMNS = {
         "A damaged column, or a name that it does not belong to.",
         "Correct the column, or name the sensor's columns with --columns.",
     ),
-    ("column-left-out", "type", NOTE): Words("Column '{column}' contains {kind}, not numbers, and was excluded."),
 }
 
 _ROWS = {
