@@ -8,9 +8,9 @@ import pytest
 import trihedron
 from hand_made_sessions import motion
 from test_read import HEADER, codes, finding, write
+from trihedron.channel_facts.turning import turning_of
 from trihedron.read import ReadError, read_recording
 from trihedron.read.names import parse_name
-from trihedron.read.turning import turning_of
 from trihedron.records import Severity
 from trihedron.units import RateUnit
 

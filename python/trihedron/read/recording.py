@@ -14,6 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, look
+from trihedron.channel_facts.turning import turning_of, turns_with
 from trihedron.read.audit.invalid import without_invalid
 from trihedron.read.audit.motionless import audit_motionless_accelerometer, audit_motionless_gyro
 from trihedron.read.audit.orientation import audit_orientation
@@ -32,7 +33,6 @@ from trihedron.read.sensors import Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Options
 from trihedron.read.temperature import temperature_of
-from trihedron.read.turning import turning_of, turns_with
 from trihedron.records import Finding, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit

@@ -10,9 +10,9 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, is_integer, look
+from trihedron.channel_facts.turning import Turning
 from trihedron.read.errors import ReadError
 from trihedron.read.names import known_unit
-from trihedron.read.turning import Turning
 from trihedron.records import Finding
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 

@@ -5,10 +5,10 @@ import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.quiet import look
+from trihedron.channel_facts.turning import CLEAR_CORRELATION, FEWEST_PAIRS, turning_of
 from trihedron.read.names import ColumnName
 from trihedron.read.sensing import of_gravity, static_norm
 from trihedron.read.table import Table
-from trihedron.read.turning import CLEAR_CORRELATION, FEWEST_PAIRS, turning_of
 from trihedron.records import Finding
 
 _NEARLY_ALL = 0.999
@@ -68,8 +68,8 @@ def by_values(table: Table, columns: list[int], time: int | None) -> tuple[Roles
 
 
 def is_force(table: Table, triad: tuple[int, ...], accelerometer: tuple[int, ...] | None, time: int | None) -> bool:
-    """Whether columns have the length of gravity in several poses and do not turn it, as a gyro's would that of the
-    ``accelerometer``."""
+    """Whether columns have the length of gravity in several poses, and neither turn the ``accelerometer``'s readings
+    as a gyro's would, nor are turned by them, as where the names of both sensors are exchanged."""
     triads = [triad] if accelerometer is None else [triad, accelerometer]
     columns = [[table.columns[i][:_ROWS] for i in one] for one in triads]
     if not all(len(axis) >= _FEWEST_ROWS for axes in columns for axis in axes):
@@ -78,7 +78,8 @@ def is_force(table: Table, triad: tuple[int, ...], accelerometer: tuple[int, ...
     rate = _ROWS_A_SECOND if time is None else _rows_a_second(table.columns[time][:_ROWS])
     if not _is_gravity(readings[0], rate):
         return False
-    return accelerometer is None or _correlation(readings[1], readings[0], rate) < CLEAR_CORRELATION
+    pairs = (readings, readings[::-1]) if accelerometer else ()
+    return all(_correlation(*pair, rate) < CLEAR_CORRELATION for pair in pairs)
 
 
 def _axes(sensor: str, triad: tuple[int, ...] | list[int]) -> Roles:

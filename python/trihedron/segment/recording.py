@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.quantiles import quantile, quantiles
-from trihedron.ranges import Range, ranges_of
+from trihedron.channel_facts.turning import turning_in_blocks
+from trihedron.quantiles import quantiles
+from trihedron.ranges import ranges_of
 from trihedron.records import Finding, Move, Pose, Recording, Segments
 from trihedron.records.progress import Progress
 from trihedron.records.segments import LEAST_POSE_S
@@ -67,7 +67,7 @@ def segment_blocks(recording: Recording, channels: Channels, *, progress: Progre
     scale = None
     if gravity is not None:
         centre = _centre(recording, channels, quiet)
-        scale = _radians_per_reading(recording, channels, ranges_of(quiet), centre)
+        scale = _radians_per_reading(recording, channels, centre)
     turning = turning_blocks(channels, quiet, gravity, scale)
     quiet &= ~turning
     if gravity is not None:
@@ -204,44 +204,15 @@ def _assemble(
     )  # fmt: skip
 
 
-# Approximate scale of a gyro reading, sufficient to separate a support that settles from a body that rotates.
-
-LEAST_TURN_RAD = 0.3
-"""Least rotation of gravity between two quiet ranges that is compared with the gyro's path."""
-USUAL = 0.8
-"""Quantile over the moves of the rotation of gravity over the gyro's path: near one where a move is direct and about a
-level axis, smaller for all others."""
-
-
-def _radians_per_reading(
-    recording: Recording, channels: Channels, ranges: list[Range], centre: FloatArray
-) -> float | None:
-    """Scale [rad/s per raw unit] by the unit, or by the rotation of gravity between quiet ranges; to a factor of two.
-
-    ``None`` in counts where no move rotates gravity.
-    """
-    unit = rate_to_si(recording.gyroscope_unit)
-    if unit is not None:
+def _radians_per_reading(recording: Recording, channels: Channels, centre: FloatArray) -> float | None:
+    """Scale [rad/s per raw unit] by the unit, or by the rotation of gravity; ``None`` in counts where none shows it."""
+    unit, gyro = rate_to_si(recording.gyroscope_unit), channels.is_gyroscope
+    if unit is not None or not gyro.any() or gyro.all():
         return unit
-    gyro = channels.is_gyroscope
-    if not gyro.any() or gyro.all():
-        return None
-    edges = np.array(ranges, dtype=np.int64).reshape(-1, 2)
-    biases = _core.column_means(channels.mean, edges, np.arange(len(edges)), len(edges))[:, gyro]
-    force = channels.mean[:, ~gyro] - centre
-    before, after = force[edges[:-1, 1] - 1], force[edges[1:, 0]]
-    size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    cosine = np.sum(before * after, axis=1) / np.where(size > 0.0, size, 1.0)
-    angle = np.where(size > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
-    # For every block between two quiet ranges: the index of the move, and the rate of the gyro.
-    length = edges[1:, 0] - edges[:-1, 1]
-    move = np.repeat(np.arange(len(length)), length)
-    block = np.arange(len(move)) + (edges[1:, 0] - np.cumsum(length))[move]
-    bias = 0.5 * (biases[:-1] + biases[1:])
-    rate = np.linalg.norm(channels.mean[block][:, gyro] - bias[move], axis=1)
-    path = np.bincount(move, np.where(channels.is_valid[block], rate, 0.0), len(angle)) * channels.step_s
-    told = (angle >= LEAST_TURN_RAD) & (path > 0.0)
-    return quantile(angle[told] / path[told], USUAL) if told.any() else None
+    mean = np.where(channels.is_valid[:, None], channels.mean, np.nan)
+    rate = np.repeat(mean[:, np.newaxis, gyro], 2, axis=1)
+    turning = turning_in_blocks(mean[:, ~gyro] - centre, rate, channels.step_s)
+    return turning.scale if turning is not None and turning.is_clear else None
 
 
 def _centre(recording: Recording, channels: Channels, quiet: BoolArray) -> FloatArray:

@@ -15,9 +15,9 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.channel_facts.turning import turning_of
 from trihedron.probability import LN_FAULT, MEDIAN_CHI2
 from trihedron.read.sensors import Sensors
-from trihedron.read.turning import turning_of
 from trihedron.records import Finding
 
 GYRO_RATIOS = (1.0, 2.0, 4.0, 8.0, 180.0 / math.pi)

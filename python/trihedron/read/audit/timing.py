@@ -7,9 +7,9 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.channel_facts.turning import turning_of
 from trihedron.read.clock.rate import mean_rate_hz, steps_of, steps_of_counter, usual_step
 from trihedron.read.sensors import Sensors
-from trihedron.read.turning import turning_of
 from trihedron.records import Finding, Severity, TimestampKind
 from trihedron.records.words import Words
 

@@ -97,6 +97,13 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
         return None
     a = _core.block_mean_readings(accelerometer, length, n)
     halves = _core.block_mean_readings(gyroscope, half, 2 * n).reshape(n, 2, 3)
+    found = turning_in_blocks(a, halves, length / rate_hz)
+    return None if found is None else replace(found, rate_hz=rate_hz)
+
+
+def turning_in_blocks(a: FloatArray, halves: FloatArray, step_s: float) -> Turning | None:
+    """As :func:`turning_of`, from the means of the accelerometer (n, 3) over blocks of ``step_s`` and of the gyro over
+    the halves of each (n, 2, 3)."""
     w = halves.mean(axis=1)
     norm = np.linalg.norm(a, axis=1)
     finite = np.isfinite(w).all(axis=1) & np.isfinite(norm) & (norm > 0.0)
@@ -121,8 +128,7 @@ def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float)
     is_noise = np.nanstd(w, axis=0) < _STILL * np.nanstd(np.diff(w, axis=0), axis=0) / math.sqrt(2.0)
     # A body's acceleration lasts as long as a move: blocks in succession are one observation of the error.
     starts = np.flatnonzero(np.diff(np.flatnonzero(usable), prepend=-2) > 1)
-    found = _fitted(mean_a[usable], mean_w[usable], seen[usable], starts, is_noise, length / rate_hz)
-    return None if found is None else replace(found, rate_hz=rate_hz)
+    return _fitted(mean_a[usable], mean_w[usable], seen[usable], starts, is_noise, step_s)
 
 
 CLEAR_CORRELATION = 0.5
