@@ -17,7 +17,7 @@ from trihedron.estimate.noise.grid import readings_of, scale_of, temperature_of
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
-from trihedron.read.chunks import open_chunks
+from trihedron.read.on_disk import open_chunks
 from trihedron.records import Calibration, Finding, Noise, Recording, TermName
 from trihedron.sensor_model import axis_scales
 from trihedron.units import AccelerationUnit, RateUnit
@@ -161,7 +161,7 @@ def noise_of_file(
 
     if 8 * log.n_rows * len(log.roles) <= IN_MEMORY_BYTES:
         return identify_noise(
-            scaled(log.whole()),
+            scaled(log.rows(0, log.n_rows)),
             rate_hz,
             names=names,
             units=units,

@@ -19,14 +19,11 @@ MIN_PLATEAUS = 3
 """Smooth peaks differ in height from move to move; three on one level within noise do not occur by chance."""
 LONG_RUN, HIGH = 8, 15.0
 """A single plateau is enough with this length, if the parabola it clips would rise by this many sigma above it."""
-STEEP = 6.0
-"""Height in sigma of a parabola with the slopes at both ends of a plateau: below it the top of a peak looks flat."""
+STEEP = 2.0 * BAND_SIGMA
+"""Height in sigma of a parabola with the slopes at both ends of a plateau: a smooth peak so high does not stay in the
+band."""
 AGREE, HALF_STEP = 4.0, 0.5
 """Standard errors of its mean, plus noise of a sample, by which a run may differ from the level of the others."""
-FEWEST_FOR_CURVE, SPREAD = 4, 5.0
-"""Samples from which slope and curvature are fitted; fewer are flat if they spread by less than five sigma."""
-FLAT = 18.0
-"""Chi-square of slope and curvature (2): one flat run in ten thousand exceeds it."""
 MOVES_SIGMA = 10.0
 """Peak-to-peak, in standard deviations, of another channel that moves: the noise of a thousand samples spans seven."""
 PARTS = 3
@@ -102,9 +99,11 @@ def _on_level(x: FloatArray, level: float, others: list[FloatArray]) -> tuple[fl
     steep = rises >= STEEP
     runs, means, errors, clear = [], [], [], []
     for first, last, rise in zip(begins[steep].tolist(), ends[steep].tolist(), rises[steep].tolist(), strict=True):
-        middle = _middle(x[first:last])
-        if not _is_flat(middle) or not _others_move(others, first, last):
+        if not _others_move(others, first, last):
             continue
+        # At its ends the reading still arrives, or already leaves.
+        cut = max((last - first) // 6, 1)
+        middle = x[first + cut : last - cut]
         runs.append((first, last))
         clear.append(last - first >= LONG_RUN and rise > HIGH)
         means.append(float(middle.mean()))
@@ -129,22 +128,6 @@ def _others_move(others: list[FloatArray], first: int, last: int) -> bool:
         any(float(np.ptp(other[a:b])) > MOVES_SIGMA for other in others)
         for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
     )
-
-
-def _middle(run: FloatArray) -> FloatArray:
-    """A run without its ends, where the reading still arrives or already leaves."""
-    cut = max(len(run) // 6, 1)
-    return run[cut:-cut]
-
-
-def _is_flat(run: FloatArray) -> bool:
-    """Whether slope and curvature of a run (in units of its noise) are within chance."""
-    n = len(run)
-    if n < FEWEST_FOR_CURVE:
-        return float(np.ptp(run)) < SPREAD
-    k = np.linspace(-1.0, 1.0, n)
-    basis, _ = np.linalg.qr(np.stack([np.ones(n), k, k * k], axis=1))
-    return bool(float(((basis[:, 1:].T @ run) ** 2).sum()) < FLAT)
 
 
 def _shared(limit: Limit, all_limits: list[Limit]) -> Limit:

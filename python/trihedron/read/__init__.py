@@ -6,8 +6,8 @@ is stated as a finding. A file that cannot become a recording raises :class:`Rea
 
 from trihedron.read.archive import devices_of
 from trihedron.read.axis_noise import read_axis_noise
-from trihedron.read.chunks import ChunkedLog, open_chunks
 from trihedron.read.errors import ReadError
+from trihedron.read.on_disk import ChunkedLog, open_chunks
 from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
 from trihedron.records.progress import Progress

@@ -70,7 +70,7 @@ def _copied_rows(
     copies = again[_repeats(columns, rows, again).all(axis=0)]
     repeats = _repeats(columns, rows, apart)
     chance = max(_independent(repeats), float(repeats.all(axis=0).mean()))
-    return copies if _are_more(len(copies), len(again), chance) else again[:0]
+    return copies if are_more(len(copies), len(again), chance) else again[:0]
 
 
 def _are_read_again(columns: Sequence[FloatArray], rows: npt.NDArray[np.signedinteger] | None) -> bool:
@@ -78,7 +78,7 @@ def _are_read_again(columns: Sequence[FloatArray], rows: npt.NDArray[np.signedin
     first = np.stack([values[:FIRST] if rows is None else values[rows[:FIRST]] for values in columns], axis=1)
     repeats = first[1:] == first[:-1]
     is_again = repeats.all(axis=1)
-    if not _are_more(int(is_again.sum()), len(repeats), _independent(repeats.T)):
+    if not are_more(int(is_again.sum()), len(repeats), _independent(repeats.T)):
         return False
     return equal_apart(first, int(np.diff(np.flatnonzero(np.r_[True, ~is_again, True])).max())) <= RARE
 
@@ -97,9 +97,9 @@ def _independent(repeats: npt.NDArray[np.bool_]) -> float:
     return float(whole.mean(axis=2).prod(axis=0).mean()) if whole.size else 1.0
 
 
-def _are_more(count: int, n: int, chance: float) -> bool:
+def are_more(count: int, n: int, chance: float, probability: float = BY_CHANCE) -> bool:
     """Whether ``count`` of ``n`` are more than by chance, and at twice its odds."""
-    return count > 2.0 * chance / (1.0 + chance) * n and bool(bdtrc(count - 1, n, chance) < BY_CHANCE)
+    return count > 2.0 * chance / (1.0 + chance) * n and bool(bdtrc(count - 1, n, chance) < probability)
 
 
 def _repeats(

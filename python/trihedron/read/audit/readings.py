@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.channel_facts.quiet import Windows
 from trihedron.read.audit.repeats import Repeats
-from trihedron.read.repeated_rows import equal_apart
+from trihedron.read.repeated_rows import are_more, equal_apart
 from trihedron.records import Finding, Severity
 from trihedron.records.channel_facts import ChannelFacts, Limit
 
@@ -56,6 +56,8 @@ def _clipped(sensor: str, limits: list[Limit], place: Place, *, is_static: bool)
 
 
 Place = Callable[[int], str]
+RARE, FEWEST = 1e-9, 5
+"""Probability of so many repeated rows, that of six standard deviations; and the fewest that are reported."""
 MANY = 0.05
 """Share of a log that is not finite from which on the finding is serious."""
 
@@ -93,36 +95,26 @@ def _non_finite(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
 
 def _repeated(sensor: str, readings: FloatArray, repeats: Repeats, place: Place) -> list[Finding]:
     """A finding where complete triads repeat more often than by chance."""
-    n = repeats.n - 1
+    n, count = repeats.n - 1, int(repeats.count[3])
     expected = float(np.prod(repeats.rates[:, :3], axis=1).mean())
-    seen = repeats.count[3] / n
-    if _is_repeated(seen, expected, repeats):
+    if are_more(count, n, expected, RARE):
         # Axes of corrected readings are mixed and not independent: rows equal apart as often as next to each other.
         expected = max(expected, equal_apart(readings, int(repeats.longest[3])))
-    if not _is_repeated(seen, expected, repeats):
+    if count < FEWEST or not are_more(count, n, expected, RARE):
         return []
     longest = int(repeats.longest[3])
     return [
         Finding.of(
             "repeated-rows",
             sensor=short(sensor),
-            count=int(repeats.count[3]),
-            fraction=seen,
+            count=count,
+            fraction=count / n,
             chance=expected,
             longest_run=longest,
             where=place(int(repeats.longest_start[3])),
             sample=repeats.longest_start[3],
         )
     ]
-
-
-def _is_repeated(seen: float, expected: float, repeats: Repeats) -> bool:
-    """Whether the share ``seen`` of repeated rows is more than chance."""
-    n = repeats.n - 1
-    # Six standard deviations above the chance, and at least twice its odds: where three of four rows are repeated,
-    # each axis repeats as often, and twice that chance is out of reach.
-    limit = expected + 6.0 * np.sqrt(max(expected, 1.0 / n) / n)
-    return bool(seen > max(limit, 2.0 * expected / (1.0 + expected)) and repeats.count[3] >= 5)
 
 
 def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Finding]:
