@@ -27,9 +27,9 @@ for noise, terms in TERMS.items():
             x += 3.0 * lfilter([math.sqrt(1.0 - decay**2)], [1.0, -decay], rng.normal(size=N))
         means = slow_changes.block_means(x)
         alone = means.beside(())
-        # Rise per parameter of an exponential and of a wave.
-        more = [(alone.deviance - means.refined(alone, is_wave=n == 3).deviance) / n for n in (2, 3)]
-        rise["slow change"].append(max(more))
+        # Rise per parameter of an exponential, a wave and a step.
+        more = [alone.deviance - means.refined(alone, kind).deviance for kind in slow_changes.KINDS]
+        rise["slow change"].append(max(np.divide(more, slow_changes.PARAMETERS)))
         rise["two levels"].append(two_levels.two_levels(x, 1.0).rise)
     for name, limit in limits.items():
         start = np.quantile(rise[name], 0.95)

@@ -117,13 +117,29 @@ def test_missing_readings_are_weighted_as_defined():
     x = rng.normal(size=400).cumsum()
     x[rng.random(400) < 0.1] = np.nan
     x[200:260] = np.nan
-    # The kernel weighs; the scatter of means of a few readings is subtracted afterwards (the next two tests).
     column = x[:, np.newaxis]
+    kinds = _core.AllanKind.Overlapping, _core.AllanKind.Hadamard
     for m in (1, 5, 40, 120):
-        weighted = _core.allan_variance(column, [m], _core.AllanKind.Overlapping)[0]
-        assert weighted[0, 0] == pytest.approx(by_definition(x, m, np.array([-1.0, 1.0])), rel=1e-11)
-        hadamard = _core.allan_variance(column, [m], _core.AllanKind.Hadamard)[0]
-        assert hadamard[0, 0] == pytest.approx(by_definition(x, m, np.array([1.0, -2.0, 1.0])), rel=1e-11)
+        for kind, signs in zip(kinds, (np.array([-1.0, 1.0]), np.array([1.0, -2.0, 1.0])), strict=True):
+            weighted = by_definition(x, m, signs)
+            found = _core.allan_variance(column, [m], kind)[0]
+            assert found[0, 0] == pytest.approx(weighted * complete_share(x, m, signs**2, weighted), rel=1e-11)
+
+
+def complete_share(x, m, factors, weighted):
+    """Variance of complete clusters over the ``weighted`` one, of one length m: the scatter of means of some of the
+    readings of a cluster about that of all of them is subtracted, (1/c - 1/m) s²."""
+    starts = np.arange(len(x) - len(factors) * m + 1)[:, None, None]
+    clusters = x[starts + m * np.arange(len(factors))[:, None] + np.arange(m)]
+    count = np.isfinite(clusters).sum(axis=2)
+    clusters, count = clusters[count.all(axis=1)], count[count.all(axis=1)]
+    if m == 1:
+        return 1.0
+    within = np.nansum((clusters - np.nanmean(clusters, axis=2, keepdims=True)) ** 2) / np.sum(count - 1)
+    inverse = 1.0 / np.mean(1.0 / np.sum(factors / count, axis=1))
+    excess = within * (inverse / np.sum(factors) - 1.0 / m)
+    # White noise alone has as much in any case.
+    return max(1.0 - excess / weighted, np.sum(factors) / m / inverse)
 
 
 @pytest.mark.parametrize("kind", ["overlapping", "non-overlapping", "hadamard"])

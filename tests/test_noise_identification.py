@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from noise_coverage import in_time
 from trihedron.estimate.noise.binned import binned
 from trihedron.estimate.noise.identify import identify_noise
-from trihedron.estimate.noise.slow_changes import slow_changes
+from trihedron.estimate.noise.slow_changes import EXPONENTIAL, slow_changes
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.files.noise import noise_figures
 from trihedron.records.finding import Severity
@@ -112,6 +112,46 @@ def test_a_step_is_found_and_does_not_become_a_random_walk(quiet):
     assert noise.axes[0].value("K") == pytest.approx(clean.axes[0].value("K"), rel=0.15)
 
 
+@pytest.mark.parametrize("lasts", [1.0, 0.12])
+def test_a_step_too_small_for_its_edge_to_show_is_found_in_means_and_leaves_no_walk(lasts):
+    # A fifth of the noise of a reading, for good or for an eighth of the log: it shows in thousands of readings alone.
+    n, at = 65_536, np.arange(65_536) / 65_536
+    x = in_time(np.random.default_rng(3), n, RATE, N=1e-2) + 0.02 * ((at > 0.37) & (at < 0.37 + lasts))
+    noise = identify_noise(x, RATE)
+    ends = [end for end in (0.37, 0.37 + lasts) if end < 1.0]
+    assert noise.breaks_s == pytest.approx([end * n / RATE for end in ends], abs=0.01 * n / RATE)
+    assert "log-jump" in codes(noise)
+    assert present(noise.axes[0]) == {"N"}
+    # With the step in it a walk of 7e-4 would be named.
+    assert noise.axes[0].terms[TermName.RATE_RANDOM_WALK].limit < 5e-4
+
+
+@pytest.mark.parametrize("is_scattered", [False, True])
+def test_n_of_noise_with_two_levels_is_that_of_both(is_scattered):
+    rng, n = np.random.default_rng(8), 60_000
+    is_loud = np.repeat(rng.random(n // 200) < 0.1, 200) if is_scattered else np.arange(n) < 0.1 * n
+    noise = identify_noise(0.1 * np.where(is_loud, 3.0, 1.0) * rng.normal(size=n), RATE)
+    assert "log-uneven" in codes(noise)
+    # A wide excursion among loud seconds may be excluded, not these.
+    assert "log-motion" not in codes(noise)
+    white, truth = noise.axes[0].terms[TermName.WHITE], 0.01 * np.sqrt(1.0 + 8.0 * is_loud.mean())
+    assert white.estimate == pytest.approx(truth, rel=0.03)
+    assert white.lower < truth < white.upper
+
+
+def test_the_best_averaging_time_lies_in_its_interval():
+    rng, inside = np.random.default_rng(5), 0
+    for _ in range(8):
+        (axis,) = identify_noise(in_time(rng, 36_000, 10.0, N=1e-2, K=1e-3), 10.0).axes
+        lower, upper = axis.averaging_ends_s
+        assert lower < axis.optimal_averaging()[0] < upper < 2.0 * lower
+        # N²/τ + K²τ/3 is least at √3 N/K.
+        inside += lower < math.sqrt(3.0) * 10.0 < upper
+    assert inside >= 6  # of eight at 95 %: a probability of 0.994
+    white = in_time(rng, 36_000, 10.0, N=1e-2)
+    assert identify_noise(white, 10.0).axes[0].averaging_ends_s[1] == math.inf
+
+
 def test_knocks_and_shaking_are_left_out_and_named(quiet):
     knocked = quiet.copy()
     knocked[1000] += 1.0
@@ -196,7 +236,7 @@ def test_two_exponentials_of_nearly_one_time_have_no_sizes_beyond_what_they_expl
     t = np.arange(36_000) / 10.0
     hump = 30.0 * np.exp(1.0) * t / 300.0 * np.exp(-t / 300.0)
     (found, *_) = slow_changes(hump + np.random.default_rng(4).normal(size=len(t)), 10.0)
-    short, long = sorted(one.time_s for one in found if not one.is_wave)[:2]
+    short, long = sorted(one.time_s for one in found if one.kind == EXPONENTIAL)[:2]
     assert long > 1.3 * short
     assert max(one.size for one in found) < 20.0 * 30.0
 
@@ -205,7 +245,7 @@ def test_a_log_too_short_for_what_its_filter_leaves_is_refused_with_a_length():
     one = np.linspace(0.1, 1.0, 10)
     band = Ordinates(one, one, one, one[None], one[None], np.arange(10), 100, 0.01, 1)
     with pytest.raises(ValueError, match=r"1 s are too short.* record 20 s or more"):
-        binned([band], 0.05)
+        binned([band], 0.05, [one < 0.0])
 
 
 def test_a_periodic_line_is_found_with_its_amplitude(quiet):

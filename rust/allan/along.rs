@@ -107,8 +107,8 @@ fn slopes(n: f64, clusters: &[usize], variance: &[f64]) -> Vec<f64> {
     clusters.iter().map(|&m| at((m as f64).log2())).collect()
 }
 
-/// Weighted isotonic regression of the slopes by pooling of neighbours that fall; `None` without any.
-fn rising(steps: &[(f64, f64, f64)]) -> Option<Vec<f64>> {
+/// Weighted isotonic regression of `(_, value, weight)` by pooling of neighbours that fall; `None` without any.
+pub(super) fn rising(steps: &[(f64, f64, f64)]) -> Option<Vec<f64>> {
     let mut pools: Vec<(f64, f64, usize)> = Vec::new();
     for &(_, slope, weight) in steps {
         pools.push((slope, weight, 1));

@@ -18,6 +18,7 @@
 pub mod along;
 pub mod degrees;
 pub mod edges;
+mod losses;
 pub mod prefix;
 pub mod readings;
 pub mod stream;

@@ -4,10 +4,11 @@
 //! weight `w = 2 c1 c2 / (m (c1 + c2))`: 1 when both are complete, 0 when either is empty, and in between the inverse
 //! of the variance that white noise gives it. `variance = Σ w (mean2 − mean1)² / (2 Σ w)`. Nothing is interpolated. For
 //! a random walk this is unbiased up to the position of the gap in its cluster; for white noise it is the variance of
-//! means of the readings present.
+//! means of the readings present, less what the missing ones add to it ([`super::losses`]).
 
 use rayon::prelude::*;
 
+use super::losses::{self, Sums};
 use super::prefix::compensated_sum;
 use super::readings::Readings;
 use super::{Curve, Kind};
@@ -31,14 +32,15 @@ pub fn variances(
             kind.name()
         )));
     }
-    let (sums, counts) = running(readings, centre);
+    let of = running(readings, centre);
+    let (sums, counts) = (&of.values, &of.counts);
     let results: Vec<(f64, usize, f64)> = clusters
         .par_iter()
         .with_max_len(1)
         .map(|&m| match kind {
             _ if interrupt::is_requested() => (f64::NAN, 0, 0.0),
-            Kind::Overlapping => every_start(&sums, &counts, m),
-            _ => one(&sums, &counts, m, kind),
+            Kind::Overlapping => every_start(sums, counts, m),
+            _ => one(sums, counts, m, kind),
         })
         .collect();
     let mut curve = Curve {
@@ -51,28 +53,35 @@ pub fn variances(
         curve.terms.push(terms);
         curve.weight.push(weight);
     }
+    losses::subtract(&mut curve, &of, clusters, kind);
     Ok(curve)
 }
 
-fn running(readings: &impl Readings, centre: f64) -> (Vec<f64>, Vec<f64>) {
+fn running(readings: &impl Readings, centre: f64) -> Sums {
     let n = readings.len();
-    let mut sums = Vec::with_capacity(n + 1);
-    let mut counts = Vec::with_capacity(n + 1);
-    let (mut high, mut low, mut count) = (0.0, 0.0, 0.0);
-    sums.push(0.0);
+    let [mut counts, mut values, mut squares] = [(); 3].map(|()| Vec::with_capacity(n + 1));
+    let (mut high, mut low, mut square, mut count) = (0.0, 0.0, 0.0, 0.0);
     counts.push(0.0);
+    values.push(0.0);
+    squares.push(0.0);
     for i in 0..n {
         let v = readings.get(i) - centre;
         if v.is_finite() {
             let (s, e) = super::prefix::two_sum(high, v);
             high = s;
             low += e;
+            square += v * v;
             count += 1.0;
         }
-        sums.push(high + low);
         counts.push(count);
+        values.push(high + low);
+        squares.push(square);
     }
-    (sums, counts)
+    Sums {
+        counts,
+        values,
+        squares,
+    }
 }
 
 /// Variance, terms and weight for one cluster size; NaN where no term has a weight.

@@ -37,6 +37,7 @@ pub(crate) struct SpectralInversion {
     lower: Vec<f64>,
     upper: Vec<f64>,
     rise_without: Vec<f64>,
+    strength_at_ends: Vec<Vec<f64>>,
     strength: Vec<f64>,
     strength_without_pair: Vec<f64>,
     rise_without_pair: f64,
@@ -98,6 +99,7 @@ impl SpectralBins {
             likelihood::invert(&self.bins, rise, pair, walk, line_outside)
         })?;
         let of = |pick: fn(&Statement) -> f64| found.terms.iter().map(pick).collect::<Vec<f64>>();
+        let ends = (found.terms.iter().flat_map(|t| t.strength_at_ends.clone())).collect();
         Ok(SpectralInversion {
             most_likely: of(|t| t.most_likely),
             median: of(|t| t.median),
@@ -105,6 +107,7 @@ impl SpectralBins {
             lower: of(|t| t.lower),
             upper: of(|t| t.upper),
             rise_without: of(|t| t.rise_without),
+            strength_at_ends: ends,
             strength: found.strength,
             strength_without_pair: found.strength_without_pair,
             rise_without_pair: found.rise_without_pair,

@@ -19,7 +19,7 @@ const MOST_POINTS: usize = 200;
 const PARTS: usize = 8;
 
 /// Estimate and interval of one term; amplitudes are square roots of strengths.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Statement {
     /// Most likely amplitude, all terms free.
     pub most_likely: f64,
@@ -33,6 +33,8 @@ pub struct Statement {
     pub upper: f64,
     /// Rise of the deviance without the term.
     pub rise_without: f64,
+    /// Strengths of all terms at the points of the profile next beyond the ends of the interval, the others refitted.
+    pub strength_at_ends: [Vec<f64>; 2],
 }
 
 /// The slope of the line: a mixture of normals over the amplitudes of one term.
@@ -193,6 +195,9 @@ fn state(bins: &Bins, k: usize, profile: &Profile, top: &Point, rise: f64) -> St
             (None, None) => at,
         }
     };
+    let strength_of = |place: usize| profile[place.min(profile.len() - 1)].1.strength.clone();
+    let below = roots.partition_point(|&(_, root)| root < -wanted);
+    let above = roots.partition_point(|&(_, root)| root < wanted);
     let (median, spread) = middle(&roots);
     let rise_without = match profile.first() {
         Some((a, point)) if *a == 0.0 => (point.deviance - top.deviance).max(0.0),
@@ -209,6 +214,7 @@ fn state(bins: &Bins, k: usize, profile: &Profile, top: &Point, rise: f64) -> St
         },
         upper: crossing(wanted),
         rise_without,
+        strength_at_ends: [strength_of(below.saturating_sub(1)), strength_of(above)],
     }
 }
 

@@ -132,7 +132,8 @@ class NoiseAxis(Judged, Frozen):
     N [unit·√s = unit/√Hz], B [unit], K [unit/√s], R [unit/s]. ``lowest_hz`` … ``highest_hz`` is the fit band.
     ``longest_tau_s`` is the longest averaging time at which the log determines an Allan deviation to 25 %.
     ``covariance_scale`` multiplies the variances where the spectrum scatters more than its terms explain; 1 where it
-    does not.
+    does not. ``averaging_ends_s`` is the 95 % interval of the best averaging time [s]; its upper end is infinite where
+    the log may be too short to show it.
     """
 
     name: str
@@ -151,6 +152,7 @@ class NoiseAxis(Judged, Frozen):
     highest_hz: float = 0.0
     longest_tau_s: float = 0.0
     covariance_scale: float = 1.0
+    averaging_ends_s: tuple[float, float] = (0.0, math.inf)
     findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:

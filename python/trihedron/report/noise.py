@@ -172,6 +172,7 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
     found = [axis.optimal_averaging() for axis in axes]
     rows = (
         ("best averaging time [s]", *(BEYOND if one is None else plain_number(one[0]) for one in found)),
+        ("   95 % interval", *(_range_of(*axis.averaging_ends_s) for axis in axes)),
         (f"bias uncertainty then [{printed}]", *("–" if one is None else plain_number(one[1]) for one in found)),
         *(
             (
@@ -187,6 +188,12 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
         ("fit band [Hz]", *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes)),
     )
     return _by_axis(axes, rows, "How long to average")
+
+
+def _range_of(lower: float, upper: float) -> str:
+    if math.isinf(upper):
+        return f"above {plain_number(lower, 2)}" if math.isfinite(lower) else "–"
+    return f"{plain_number(lower, 2)} … {plain_number(upper, 2)}"
 
 
 def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]], accuracy: float) -> Table:

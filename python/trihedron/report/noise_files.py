@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -54,6 +55,7 @@ def _axis_record(axis: NoiseAxis, lengths: Mapping[TermName, float | None]) -> d
             entry["recording_length_s"] = lengths[term]
         terms[term.value] = entry
     best = axis.optimal_averaging()
+    lower_s, upper_s = (end if math.isfinite(end) else None for end in axis.averaging_ends_s)
     return {
         **{name: getattr(axis, name) for name in ("name", "unit", "mean", "sample_sigma", "resolution")},
         "terms": terms,
@@ -63,6 +65,8 @@ def _axis_record(axis: NoiseAxis, lengths: Mapping[TermName, float | None]) -> d
         "lowest_hz": axis.lowest_hz,
         "highest_hz": axis.highest_hz,
         "optimal_tau_s": None if best is None else best[0],
+        "optimal_tau_lower_s": lower_s,
+        "optimal_tau_upper_s": upper_s,
         "least_deviation": None if best is None else best[1],
         "longest_tau_s": axis.longest_tau_s,
         "covariance_scale": axis.covariance_scale,

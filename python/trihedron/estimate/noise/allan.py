@@ -12,7 +12,6 @@ from scipy.special import chdtri
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.errors import InputError
-from trihedron.estimate.noise.gaps import true_share
 from trihedron.records.allan_curve import AllanCurve, AllanKind
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
@@ -110,9 +109,6 @@ def curve_of(
     sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
     found = [_core.allan_variance(part, sizes, KINDS[kind]) for part in parts]
     variance, terms, weight = (np.concatenate([one[k] for one in found]).T for k in range(3))
-    order = 3 if kind == "hadamard" else 2
-    for c, column in enumerate(column for part in parts for column in part.T):
-        variance[:, c] *= true_share(column, np.array(sizes), variance[:, c], order)
     return curve_with_intervals(
         kind, rate_hz, n, np.array(sizes), variance, terms.astype(np.int64), weight, confidence, names, units
     )

@@ -8,10 +8,10 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import BoolArray, FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.channel_facts.low_pass import RISE
 from trihedron.estimate.noise import remarks
-from trihedron.estimate.noise.binned import BinnedSpectrum, Model, models_of
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model, Range, models_of
 from trihedron.estimate.noise.lines import find_lines, white_limit
 from trihedron.estimate.noise.screening import Readout
 from trihedron.estimate.noise.spectrum import SYMBOLS, Ordinates
@@ -55,18 +55,18 @@ def identify_axis(
     # With scattered losses and slow noise only block means are used: their spectrum ends below Nyquist.
     nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
-    masks: list[BoolArray] | None = None
+    affected: Sequence[Range] = ()
 
     def models(bands: Sequence[Ordinates]) -> list[Model]:
-        return models_of(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
+        return models_of(bands, highest, affected, tolerance=TOLERANCE if highest < nyquist else 0.0)
 
     rounding = blank.resolution**2 / (12.0 * blank.rate_hz)
-    highest, at_nyquist = white_limit(bands, nyquist, masks, rounding)
+    highest, at_nyquist = white_limit(bands, nyquist, affected, rounding)
     likely = models(bands)
-    lines, masks = find_lines(bands, likely[0], 1.0 / blank.rate_hz)
+    lines, affected = find_lines(bands, likely[0], 1.0 / blank.rate_hz)
     if lines:
         findings.append(remarks.lines(lines, blank.unit))
-        highest, at_nyquist = white_limit(bands, nyquist, masks, rounding)
+        highest, at_nyquist = white_limit(bands, nyquist, affected, rounding)
         likely = models(bands)
     is_filtered = highest < nyquist
     if is_filtered or math.isnan(at_nyquist):
@@ -79,13 +79,17 @@ def identify_axis(
         highest_hz=float(highest),
         findings=(*blank.findings, *findings),
     )
-    axis, *others = (_of_all(model, blank, tails, is_filtered=is_filtered) for model in likely)
+
+    def at_all_times(model: Model) -> NoiseAxis:
+        """The axis with the terms of a model, and of its other likely correlation times."""
+        return _over([stated(one, blank, tails, is_filtered=is_filtered) for one in (model, *model.beside)])
+
+    every = [at_all_times(model) for model in likely]
     # Beside changes that are only plausible no other process is, but one that is stated is kept where it may be.
-    beside = (models(bands)[0 if axis.gauss_markov is None else -1] for bands in choices[1:])
-    stated_beside = [_of_all(model, blank, tails, is_filtered=is_filtered) for model in beside]
-    axis = _over(axis, (*others, *stated_beside))
-    pair = min((one.slow_pair for one in (axis, *stated_beside) if one.slow_pair), key=lambda pair: pair.evidence)
-    axis = replace(axis, slow_pair=pair)
+    kept = 0 if every[0].gauss_markov is None else -1
+    stated_beside = [at_all_times(models(bands)[kept]) for bands in choices[1:]]
+    pairs = (one.slow_pair for one in (every[0], *stated_beside) if one.slow_pair)
+    axis = replace(_over([*every, *stated_beside]), slow_pair=min(pairs, key=lambda pair: pair.evidence))
     return replace(axis, findings=(*axis.findings, *remarks.about_terms(axis, range_degc)))
 
 
@@ -94,18 +98,9 @@ def longest_tau_s(curve: AllanCurve, channel: int) -> float:
     return float(max(curve.tau_s[curve.edf[:, channel] >= LEAST_EDF], default=0.0))
 
 
-def _of_all(model: Model, blank: NoiseAxis, tails: float, *, is_filtered: bool) -> NoiseAxis:
-    """``blank`` with the terms of a model and of its other likely correlation times."""
-    one, *others = (stated(each, blank, tails, is_filtered=is_filtered) for each in (model, *model.beside))
-    return _over(one, others)
-
-
-def _over(axis: NoiseAxis, others: Sequence[NoiseAxis]) -> NoiseAxis:
-    """The axis with intervals that reach over those of other models of it; a term is named where all name it."""
-    if not others:
-        return axis
-    every = (axis, *others)
-    terms = {}
+def _over(every: Sequence[NoiseAxis]) -> NoiseAxis:
+    """The first axis with intervals that reach over those of other models of it; a term is named where all name it."""
+    axis, terms = every[0], {}
     for name, term in axis.terms.items():
         each = [one.terms[name] for one in every]
         is_present = all(one.is_present for one in each)
@@ -126,7 +121,23 @@ def _over(axis: NoiseAxis, others: Sequence[NoiseAxis]) -> NoiseAxis:
             lower=min(one.lower for one in same),
             upper=max(one.upper for one in same),
         )
-    return replace(axis, terms=MappingProxyType(terms), gauss_markov=process)
+    lower, upper = zip(*(one.averaging_ends_s for one in every), strict=True)
+    ends_s = (min(lower), max(upper))
+    return replace(axis, terms=MappingProxyType(terms), gauss_markov=process, averaging_ends_s=ends_s)
+
+
+def _averaging_ends_s(axis: NoiseAxis, found: _core.SpectralInversion) -> tuple[float, float]:
+    """Shortest and longest best averaging time [s] over the ends of the intervals of all terms, the others refitted."""
+    times_s = []
+    for strengths in found.strength_at_ends:
+        root = np.sqrt(strengths)
+        terms = dict(axis.terms)
+        for symbol, size in zip(SYMBOLS, root, strict=False):
+            terms[TermName(symbol)] = replace(terms[TermName(symbol)], fitted=float(size))
+        process = axis.gauss_markov and replace(axis.gauss_markov, sigma_process=float(root[_PROCESS]))
+        best = replace(axis, terms=MappingProxyType(terms), gauss_markov=process).optimal_averaging()
+        times_s.append(math.inf if best is None else best[0])
+    return min(times_s), max(times_s)
 
 
 def stated(model: Model, blank: NoiseAxis, tails: float = 0.0, *, is_filtered: bool = False) -> NoiseAxis:
@@ -157,7 +168,7 @@ def stated(model: Model, blank: NoiseAxis, tails: float = 0.0, *, is_filtered: b
         ends = (found.spread[_PROCESS], found.lower[_PROCESS], found.upper[_PROCESS])
         process = GaussMarkov(found.most_likely[_PROCESS], model.correlation_time_s, *ends, model.evidence)
     said = [] if unexplained is None else [remarks.unexplained(*unexplained)]
-    return replace(
+    axis = replace(
         blank,
         terms=MappingProxyType(terms),
         gauss_markov=process,
@@ -166,6 +177,7 @@ def stated(model: Model, blank: NoiseAxis, tails: float = 0.0, *, is_filtered: b
         covariance_scale=scale,
         findings=(*blank.findings, *said),
     )
+    return replace(axis, averaging_ends_s=_averaging_ends_s(axis, found))
 
 
 def straightened(spectrum: BinnedSpectrum) -> tuple[BinnedSpectrum, float]:

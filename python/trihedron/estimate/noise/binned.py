@@ -22,6 +22,7 @@ EVIDENCE = 8.0
 it with a probability of 0.25 % (half a chi-square with one degree of freedom)."""
 SLOW_TERMS = (2, 3)
 """The terms that the process may replace: B and K."""
+DROPPED = (frozenset[int](), *(frozenset({k}) for k in SLOW_TERMS), frozenset(SLOW_TERMS))
 
 TOLERANCE_GAUSS_MARKOV = 0.02
 """Relative uncertainty of a half octave in the search for a Gauss-Markov process."""
@@ -34,6 +35,10 @@ RUNS = (1, 2, 4, 8)
 
 BIN_WIDTH = 1.025
 """Ratio of the edges of a bin: the density of a random walk varies by 5 % inside it, and its mean is used."""
+
+
+Range = tuple[float, float]
+"""Frequencies [Hz] from the lower to the upper."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +112,20 @@ class BinnedSpectrum:
         )
 
 
-def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolArray] | None = None) -> BinnedSpectrum:
+def within(bands: Sequence[Ordinates], ranges: Sequence[Range]) -> list[BoolArray]:
+    """Masks of the ordinates of each band that lie in ``ranges`` of frequency [Hz]."""
+    masks = [np.zeros(len(band.frequency_hz), dtype=bool) for band in bands]
+    for band, mask in zip(bands, masks, strict=True):
+        for low_hz, high_hz in ranges:
+            mask[np.searchsorted(band.frequency_hz, low_hz) : np.searchsorted(band.frequency_hz, high_hz, "right")] = (
+                True
+            )
+    return masks
+
+
+def binned(bands: Sequence[Ordinates], highest_hz: float, masked: Sequence[BoolArray]) -> BinnedSpectrum:
     """Ordinates up to ``highest_hz`` that are not ``masked``, averaged in bins of ``BIN_WIDTH``."""
-    pick = [band.frequency_hz <= highest_hz for band in bands]
-    if masked is not None:
-        pick = [p & ~m for p, m in zip(pick, masked, strict=True)]
+    pick = [(band.frequency_hz <= highest_hz) & ~mask for band, mask in zip(bands, masked, strict=True)]
     frequency = np.concatenate([band.frequency_hz[p] for band, p in zip(bands, pick, strict=True)])
     if len(frequency) == 0:
         lasts_s = max(band.length * band.step_s for band in bands)
@@ -169,19 +183,20 @@ class Model:
 def models_of(
     bands: Sequence[Ordinates],
     highest_hz: float,
-    masked: Sequence[BoolArray] | None = None,
+    affected: Sequence[Range] = (),
     *,
     tolerance: float = 0.0,
 ) -> list[Model]:
-    """The models of the ordinates up to ``highest_hz`` that are not ``masked``, the one that is stated first.
+    """The models of the ordinates up to ``highest_hz`` outside the ranges that lines have ``affected``, the one that is
+    stated first.
 
     Raises ``InputError`` when the channel does not change, or no ordinate of the spectrum remains.
     """
+    masked = within(bands, affected)
     spectrum = binned(bands, highest_hz, masked)
     cornered = _cornered(bands, spectrum.fit.strength)
     if any(c.any() for c in cornered):
-        both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
-        spectrum = binned(bands, highest_hz, both)
+        spectrum = binned(bands, highest_hz, [c | m for c, m in zip(cornered, masked, strict=True)])
     if tolerance > 0.0:
         spectrum = spectrum.capped(tolerance)
     return models_of_bins(min(band.step_s / band.block for band in bands), spectrum)
@@ -210,13 +225,17 @@ def models_of_bins(step_s: float, spectrum: BinnedSpectrum) -> list[Model]:
     if not longest > 64 * shortest:
         return [without]
 
-    n_terms = range(len(SYMBOLS))
-    models = [[k for k in n_terms if k not in dropped] for dropped in ((), *((k,) for k in SLOW_TERMS), SLOW_TERMS)]
-
     def deviances(likelihood: _core.SpectralBins, process: Sequence[int] = ()) -> FloatArray:
-        return np.array([likelihood.fit([*active, *process]).deviance for active in models])
+        """(4,) with all terms, without each of the slow ones, and without both."""
+        found: dict[frozenset[int], _core.SpectralFit] = {}
+        for dropped in DROPPED:
+            # Without a term that is zero where others are dropped the fit is the same.
+            same = (fit for less, fit in found.items() if less < dropped and not any(fit.strength[k] for k in dropped))
+            terms = (k for k in range(len(SYMBOLS)) if k not in dropped)
+            found[dropped] = next(same, None) or likelihood.fit([*terms, *process])
+        return np.array([fit.deviance for fit in found.values()])
 
-    plain, n_active = deviances(capped.likelihood), np.array([len(active) for active in models])
+    plain, n_active = deviances(capped.likelihood), np.array([len(SYMBOLS) - len(dropped) for dropped in DROPPED])
 
     def gains(times_s: FloatArray, prices: Sequence[float] = (EVIDENCE,)) -> FloatArray:
         """(prices, times) decrease of the deviance by a process beyond that of terms at each price."""

@@ -8,9 +8,8 @@ f² S + f (1 - f) h s² (docs/noise.md, eq. 16).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import isotonic_regression
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import FloatArray
 from trihedron.ranges import edges_of, ranges_of
 
 MOST_BRIDGED = 0.02
@@ -21,8 +20,6 @@ LONGEST_SCATTERED = 64
 """Longest run of missing readings that is no gap: with half of all lost at random, 64 in a row have p = 1e-15."""
 MOST_SLOW = 3.0
 """Ratio of the variance to that from reading to reading above which a log with losses does not show its fast noise."""
-MOST_LOOKS = 8192
-"""Most clusters used to estimate the correction for missing readings, which is then accurate to 1 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +58,10 @@ def bridged(x: FloatArray) -> FloatArray:
     gone = ~np.isfinite(x)
     if not gone.any() or gone.all():
         return x
-    start, stop = edges_of(gone).T
-    short = stop - start <= LONGEST_SCATTERED
-    place = np.zeros(len(x) + 1, dtype=np.int64)
-    place[start[short]] += 1
-    place[stop[short]] -= 1
-    fill = np.flatnonzero(np.cumsum(place[:-1]))
-    out = x.copy()
-    out[fill] = np.interp(fill, np.flatnonzero(~gone), x[~gone])
+    out = np.interp(np.arange(len(x)), np.flatnonzero(~gone), x[~gone])
+    for start, stop in ranges_of(gone):
+        if stop - start > LONGEST_SCATTERED:
+            out[start:stop] = np.nan
     return out
 
 
@@ -130,46 +123,3 @@ def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
     if not out:
         return np.empty((0, parts.shape[1])), np.empty(0)
     return np.stack(out), np.array(shares)
-
-
-def true_share(x: FloatArray, clusters: IntArray, variance: FloatArray, order: int = 2) -> FloatArray:
-    """(k,) ratio of the Allan variance without missing readings to ``variance`` (k,), that of the readings present.
-
-    ``order`` 2 is the Allan, 3 the Hadamard variance. It lies between the ratio of white noise and 1 (slow noise, which
-    missing readings do not change); the share of slow noise is non-decreasing along the clusters.
-    """
-    present = np.isfinite(x)
-    if present.all():
-        return np.ones(len(clusters))
-    level = np.where(present, x, 0.0).sum() / max(int(present.sum()), 1)
-    y = np.where(present, x - level, 0.0)
-    count, total, square = (np.concatenate([[0.0], np.cumsum(v)]) for v in (present, y, y**2))
-    least, slow = np.ones(len(clusters)), np.full(len(clusters), np.nan)
-    factors = (1.0, 1.0) if order == 2 else (1.0, 4.0, 1.0)
-    for i, m in enumerate(clusters.tolist()):
-        last = len(x) - order * m
-        if m == 1 or last < 0 or not np.isfinite(variance[i]):
-            continue
-        starts = np.unique(np.linspace(0, last, min(last + 1, MOST_LOOKS)).astype(np.int64))
-        c, s, q = (
-            np.stack([v[starts + (k + 1) * m] - v[starts + k * m] for k in range(order)])
-            for v in (count, total, square)
-        )
-        whole = np.all(c > 0, axis=0)
-        degrees = float(np.maximum(c - 1, 0)[:, whole].sum())
-        if not degrees > 0:
-            continue
-        within = float((q - s**2 / np.maximum(c, 1.0))[:, whole].sum()) / degrees
-        inverse = np.tensordot(factors, 1.0 / c[:, whole], axes=1)
-        # Weights as in the variance: the inverse of each term's variance by white noise.
-        mean_inverse = len(inverse) / float(np.sum(1.0 / inverse))
-        full = sum(factors) / m
-        least[i] = full / mean_inverse
-        excess = within * (mean_inverse - full) / sum(factors)
-        if least[i] < 1.0 - 1e-9:
-            slow[i] = np.clip((1.0 - excess / variance[i] - least[i]) / (1.0 - least[i]), 0.0, 1.0)
-    known = np.isfinite(slow)
-    if not known.any():
-        return np.ones(len(clusters))
-    slow[known] = isotonic_regression(slow[known], weights=len(x) / clusters[known]).x
-    return np.asarray(np.where(known, least + (1.0 - least) * np.where(known, slow, 0.0), 1.0))

@@ -24,18 +24,19 @@ from trihedron.estimate.noise.screening import (
     repeated_rows,
     shaken,
     steps_and_impacts,
-    tail_error,
     turn_of_gravity,
 )
 from trihedron.estimate.noise.slow_changes import (
     MOSTLY,
+    STEP,
     SlowChange,
     beside_each,
     share_of_temperature,
     slow_changes,
+    steps_of,
     without,
 )
-from trihedron.estimate.noise.spectrum import evenness, ordinates, ordinates_of_means, spread_of_mean
+from trihedron.estimate.noise.spectrum import error_of_mean, evenness, ordinates
 from trihedron.estimate.noise.two_levels import two_levels
 from trihedron.ranges import merged
 from trihedron.records import AllanCurve, Finding
@@ -152,11 +153,12 @@ def identify_noise(
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Readings of one channel, ``column`` (n,), with its events and slow changes; or means of ``block`` readings beside
-    the first of them, ``head`` (k,).
+    """Readings of one channel, ``column`` (n,), with its events and slow changes; or means beside the first readings,
+    ``head`` (k,).
 
     ``cuts`` are intervals to exclude, ``choices`` the slow changes that are stated (subtracted) and those that may be
-    there, ``share_of_heat`` that of the slow changes which the temperature explains.
+    there, ``share_of_heat`` that of the slow changes which the temperature explains, ``louder`` the ratio of a second
+    level of its noise to the first.
     """
 
     column: FloatArray
@@ -168,13 +170,23 @@ class Channel:
     findings: Sequence[Finding] = ()
     choices: Sequence[Sequence[SlowChange]] = ((),)
     share_of_heat: float = 0.0
+    louder: float = 1.0
     head: FloatArray | None = None
-    block: int = 1
+
+    def stepped(self, choice: int = 0) -> list[Event]:
+        """Its steps, those among the slow changes of a choice included."""
+        more = steps_of(self.choices[choice], len(self.column), self.rate_hz)
+        return sorted([*self.steps, *more], key=lambda step: step.start)
+
+    def stretches(self, choice: int) -> list[tuple[int, int]]:
+        """Those between its steps, beside the slow changes of a choice."""
+        edges = [0, *(at for step in self.stepped(choice) for at in (step.start, step.stop)), len(self.column)]
+        return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= SHORTEST_STRETCH]
 
     @property
     def breaks(self) -> list[float]:
         """Middles of the steps, in readings."""
-        return [step.middle for step in self.steps]
+        return [step.middle for step in self.stepped()]
 
     @property
     def is_heated(self) -> bool:
@@ -191,17 +203,20 @@ class Channel:
         steps, impacts = sudden_changes(self.column, self.rate_hz)
         calm = replace(self, column=self.column.copy()) if impacts else self
         calm.leave_out([(impact.start, impact.stop) for impact in impacts])
-        shocks = shaken(calm.column, self.rate_hz)
+        (shocks, is_level), louder = shaken(calm.column, self.rate_hz), 1.0
         # Steps during shaking are part of it.
-        steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
-        findings = list(remarks.events(steps, impacts, shocks, self.rate_hz, self.unit))
+        steps = [one for one in steps if not one.overlaps(shocks)]
+        if is_level:
+            louder = max(event.size for event in shocks)
+            impacts, shocks = [one for one in impacts if not one.overlaps(shocks)], []
+        findings = list(remarks.events(impacts, shocks, self.rate_hz, self.unit))
         cuts = merged([(e.start, e.stop) for e in (*shocks, *impacts)])
         share = sum(stop - start for start, stop in cuts) / len(self.column)
         if share > MOST_DISTURBED:
             # With too large a share disturbed, no undisturbed noise can be measured: nothing is excluded.
             findings.append(Finding.of("log-motion", "throughout", share=share))
             steps, cuts = [], []
-        return replace(self, steps=steps, cuts=cuts, findings=findings)
+        return replace(self, steps=steps, cuts=cuts, findings=findings, louder=louder)
 
     def without_changes(self, heat: FloatArray | None = None) -> Channel:
         """The channel without its slow changes, or with the share of them that the temperature (n,) explains."""
@@ -224,21 +239,21 @@ class Channel:
         self, blank: NoiseAxis, curve: AllanCurve, channel: int, heat: FloatArray | None = None
     ) -> NoiseAxis:
         """The ``blank`` axis with its terms, beside the temperature (n,), and the findings of the channel."""
-        even, ratio = evenness(self.column) if self.head is None else (1.0, 1.0)
-        blank = replace(blank, findings=(*self.findings, *remarks.uneven(even, ratio), *blank.findings))
+        even, ratio = evenness(self.column if self.head is None else self.head)
+        said = (*remarks.jumps(self.stepped(), self.rate_hz, self.unit), *self.findings)
+        said = (*said, *remarks.uneven(even, ratio, self.louder))
+        blank = replace(blank, findings=(*said, *blank.findings))
         if blank.sample_sigma == 0.0:
             return blank
         range_degc = remarks.UNLOGGED if heat is None else (float(np.min(heat)), float(np.max(heat)))
-        edges = np.array([0, *(at for step in self.steps for at in (step.start, step.stop)), len(self.column)])
-        stretches = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a >= SHORTEST_STRETCH]
-        choices = [
-            ordinates(x, self.rate_hz, stretches, changes)
-            if self.head is None
-            else ordinates_of_means((x, blank.rate_hz), self.block, stretches, self.head, changes)
-            for x, changes in beside_each(self.column, self.choices, self.rate_hz)
-        ]
-        # N of a level that changes is the mean of a sample of pieces.
-        tails = math.hypot(tail_error(self.column if self.head is None else self.head), 0.5 * spread_of_mean(even))
+        head = None if self.head is None else (self.head, blank.rate_hz)
+        choices = []
+        for k, (x, changes) in enumerate(beside_each(self.column, self.choices, self.rate_hz)):
+            smooth = [one for one in changes if one.kind != STEP]
+            bands = ordinates(x, self.rate_hz, self.stretches(k), smooth, head)
+            choices.append([replace(band, count=even * band.count) for band in bands])
+        # N of readings with long tails, or of a level that changes, is the mean of a sample of pieces.
+        tails = 0.5 * error_of_mean(even)
         axis = identify_axis(choices, blank, curve, channel, tails, range_degc)
         # Drift that the temperature explains is stated with it.
         others = tuple(one for one in axis.findings if one.code != "log-drift")

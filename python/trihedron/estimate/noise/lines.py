@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri
 
-from trihedron.arrays import TINY, BoolArray, FloatArray
-from trihedron.estimate.noise.binned import BinnedSpectrum, Model, binned, models_of_bins
+from trihedron.arrays import TINY, FloatArray
+from trihedron.estimate.noise.binned import BinnedSpectrum, Model, Range, binned, models_of_bins, within
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.probability import RARE_ALARM
 from trihedron.records.noise import SpectralLine
@@ -21,10 +21,10 @@ FLOOR = 0.5
 """Least share of white noise in the power at Nyquist beside a process; behind a low-pass there is only rounding."""
 
 
-def find_lines(bands: Sequence[Ordinates], model: Model, step_s: float) -> tuple[list[SpectralLine], list[BoolArray]]:
-    """Significant sinusoids above the fitted noise, and masks of the ordinates of each band that they affect."""
+def find_lines(bands: Sequence[Ordinates], model: Model, step_s: float) -> tuple[list[SpectralLine], Sequence[Range]]:
+    """Significant sinusoids above the fitted noise, and the ranges of frequency [Hz] that they affect."""
     lines: list[tuple[SpectralLine, float, int]] = []
-    masks = []
+    affected: list[Range] = []
     total = sum(len(band.power) for band in bands)
     for number, band in enumerate(bands):
         expected, slow = model.power(band, step_s), np.asarray(model.spectrum.fit.columns)
@@ -41,9 +41,9 @@ def find_lines(bands: Sequence[Ordinates], model: Model, step_s: float) -> tuple
                 continue
             near = _skirt(ratio, int(i))
             mask[near] = True
+            affected.append((float(band.frequency_hz[near][0]), float(band.frequency_hz[near][-1])))
             lines.append((_line(band, power[near], level[near], near), band.length * band.step_s, number))
-        masks.append(mask)
-    return _merged(lines), masks
+    return _merged(lines), affected
 
 
 def _merged(lines: Sequence[tuple[SpectralLine, float, int]]) -> list[SpectralLine]:
@@ -117,7 +117,7 @@ def smooth_level(band: Ordinates, ratio: FloatArray) -> FloatArray:
 
 
 def white_limit(
-    bands: Sequence[Ordinates], nyquist_hz: float, masked: Sequence[BoolArray] | None, rounding: float = 0.0
+    bands: Sequence[Ordinates], nyquist_hz: float, affected: Sequence[Range], rounding: float = 0.0
 ) -> tuple[float, float]:
     """Upper end [Hz] of the fit band, up to which the spectrum is a sum of terms, and power at Nyquist over the terms'.
 
@@ -125,6 +125,7 @@ def white_limit(
     deviates, the band is reduced by half an octave. A process of some readings bends the spectrum as a filter does, but
     leaves white noise above its corner, more than the ``rounding`` of the ADC (density): the band is then the whole.
     """
+    masked = within(bands, affected)
     whole, highest = binned(bands, nyquist_hz, masked), nyquist_hz
     spectrum = whole
     while _deviates(spectrum, highest) or _droops(spectrum, highest):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from trihedron.estimate.noise.slow_changes import EXPONENTIAL, WAVE
 from trihedron.records import Finding, NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
@@ -23,13 +24,15 @@ UNLOGGED = (math.nan, math.nan)
 """Range of a temperature that was not logged."""
 
 
-def events(
-    steps: Sequence[Event], impacts: Sequence[Event], shocks: Sequence[Event], rate_hz: float, unit: str
-) -> Iterator[Finding]:
-    """Findings for steps, impacts and shaking of one axis; the largest step and impact with their times."""
+def jumps(steps: Sequence[Event], rate_hz: float, unit: str) -> Iterator[Finding]:
+    """Finding for steps of one axis; the largest with its time."""
     if steps:
         worst = max(steps, key=lambda e: abs(e.size))
         yield Finding.of("log-jump", n_steps=len(steps), step=worst.size, unit=unit, time_s=worst.start / rate_hz)
+
+
+def events(impacts: Sequence[Event], shocks: Sequence[Event], rate_hz: float, unit: str) -> Iterator[Finding]:
+    """Findings for impacts and shaking of one axis; the largest impact with its time."""
     if impacts:
         worst = max(impacts, key=lambda e: abs(e.size))
         yield Finding.of(
@@ -80,29 +83,30 @@ def unexplained(deviation: float, frequency_hz: float) -> Finding:
     return Finding.of("spectrum-unexplained", deviation=deviation, frequency_hz=frequency_hz, tau_s=tau_s)
 
 
-def uneven(even: float, ratio: float) -> Iterator[Finding]:
-    """Finding for a level of noise that changes along the log, so far that it costs a tenth of the readings."""
-    if even < EVEN:
-        yield Finding.of("log-uneven", ratio=ratio)
+def uneven(even: float, ratio: float, louder: float) -> Iterator[Finding]:
+    """Finding for a level of noise that changes along the log, so far that it costs a tenth of the readings, or with
+    stretches ``louder`` than the others."""
+    if even < EVEN or louder > 1.0:
+        yield Finding.of("log-uneven", ratio=max(ratio, louder))
 
 
 def changes(found: Sequence[SlowChange], unit: str, heat: FloatArray | None = None) -> Iterator[Finding]:
     """Findings for the exponentials of a warm-up, beside the logged temperature ``heat``, and for waves."""
     low_degc, high_degc = UNLOGGED if heat is None else (float(heat.min()), float(heat.max()))
     for one in found:
-        if one.is_wave:
+        if one.kind == WAVE:
             yield Finding.of("log-drift", "wave", period_s=one.time_s, amplitude=one.size, unit=unit)
-            continue
-        yield Finding.of(
-            "log-drift",
-            "warm-up",
-            drift=one.size,
-            time_s=one.time_s,
-            unit=unit,
-            has_temperature=heat is not None,
-            low_degc=low_degc,
-            high_degc=high_degc,
-        )
+        elif one.kind == EXPONENTIAL:
+            yield Finding.of(
+                "log-drift",
+                "warm-up",
+                drift=one.size,
+                time_s=one.time_s,
+                unit=unit,
+                has_temperature=heat is not None,
+                low_degc=low_degc,
+                high_degc=high_degc,
+            )
 
 
 def about_terms(axis: NoiseAxis, range_degc: tuple[float, float] = UNLOGGED) -> Iterator[Finding]:

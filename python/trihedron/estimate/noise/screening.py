@@ -4,19 +4,22 @@ Every detector measures the log's own scatter robustly; its threshold is the val
 exceeds once in 10 000 logs.
 """
 
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtri
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.channel_facts.limits import share_at_limits
 from trihedron.channel_facts.static_axes import adc_step
 from trihedron.probability import RARE_ALARM
 from trihedron.quantiles import MAD_TO_SIGMA
-from trihedron.ranges import edges_of
+from trihedron.ranges import edges_of, merged
 from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.transforms import directions_of
 
@@ -31,6 +34,10 @@ FEW, CLOSELY = 2, 0.7
 TURN_RAD = 0.002
 """Turn of gravity from one mean to the next that motion makes: noise of 1 mg/√Hz, more than any part has, averaged
 over a second turns it by as much, a bias that drifts by 0.1 g in a log by a third of it."""
+LONGEST_EVENT = 64
+"""Lengths of the longest event in a log: what lasts longer is a state of it."""
+SAME_SHAPE = 1.3
+"""Largest ratio of the ratios of second to first differences of two noises of one spectrum."""
 MEANS_S, MEANS, FEWEST_MEANS = 1.0, 160, 16
 """Least length [s], most and least number of the means between which gravity turns."""
 
@@ -48,6 +55,10 @@ class Event:
         """Its middle."""
         return 0.5 * (self.start + self.stop)
 
+    def overlaps(self, others: Sequence[Event]) -> bool:
+        """Whether it has readings in common with one of the ``others``."""
+        return any(one.start < self.stop and self.start < one.stop for one in others)
+
 
 def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
     """Steps of the level, and short excursions (impacts), of one channel ``x`` (n,); NaN marks a missing reading.
@@ -58,7 +69,7 @@ def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
     n = len(x)
     scales = []
     size = 1
-    while n // size >= 64:
+    while n // size >= LONGEST_EVENT:
         stride = max(1, size // 4)
         scales.append((size, stride, _limit((n - 2 * size) // stride + 1, n / size)))
         size *= 2
@@ -91,12 +102,14 @@ def _level_change(x: FloatArray, at: int, width: int, reach: int) -> float:
     return after - before
 
 
-def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
-    """Stretches in which the scatter from reading to reading is far above that of the rest of the log."""
+def shaken(x: FloatArray, rate_hz: float) -> tuple[list[Event], bool]:
+    """Stretches in which the scatter from reading to reading is far above that of the rest of the log; and whether they
+    are no motion but noise with a second level: longer together than any event that is looked for, equally loud, and
+    with the spectrum of the other readings. A hand or a support that vibrates is never twice as loud."""
     size = int(max(16, min(rate_hz, len(x) // 64)))
     n = len(x) // size
     if n < 32:
-        return []
+        return [], False
     level = np.log(_core.block_scatter(x, size) + TINY)
     centre = np.nanmedian(level)
     # With counts that rarely change the spread may be underestimated: at least that of chi-square is used.
@@ -105,15 +118,30 @@ def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
     hit = (distance > limit) & (level - centre > math.log(1.5))
     # As many close below the limit as above it are the tail of one distribution, as in `find_jumps`: no events.
     if FEW < np.count_nonzero(hit) < np.count_nonzero((distance > CLOSELY * limit) & (distance <= limit)):
-        return []
-    out: list[Event] = []
-    for i in np.flatnonzero(hit).tolist():
-        size_here = float(math.exp(0.5 * (level[i] - centre)))
-        if out and out[-1].stop >= (i - 1) * size:
-            out[-1] = Event(out[-1].start, int((i + 1) * size), max(size_here, out[-1].size))
-        else:
-            out.append(Event(int(max(0, i - 1) * size), int((i + 1) * size), size_here))
-    return out
+        return [], False
+    # A stretch begins before the second that is loud as a whole.
+    stretches = merged((max(i - 1, 0), i + 1) for i in np.flatnonzero(hit).tolist())
+    events = [Event(a * size, b * size, math.exp(0.5 * float(np.nanmax(level[a:b]) - centre))) for a, b in stretches]
+    loud = level[hit]
+    if len(loud) * LONGEST_EVENT < n:
+        return events, False
+    # Of squared differences of white noise each has 2/3 of a degree of freedom.
+    scatter = MAD_TO_SIGMA * float(np.median(np.abs(loud - np.median(loud))))
+    is_level = scatter < 2.0 * math.sqrt(3.0 / size) and _have_one_spectrum(x, np.repeat(hit, size))
+    return events, is_level
+
+
+def _have_one_spectrum(x: FloatArray, mask: BoolArray) -> bool:
+    """Whether readings ``x`` (n,) inside and outside of a ``mask`` of the first of them differ in level alone.
+
+    A hand or a support that vibrates has most of its power in the first differences.
+    """
+    ratio = []
+    for part in (mask, ~mask):
+        readings = np.where(part, x[: len(mask)], np.nan)
+        first, second = (float(np.nanmean(np.diff(readings, order) ** 2)) for order in (1, 2))
+        ratio.append(second / first)
+    return 1.0 / SAME_SHAPE < ratio[0] / ratio[1] < SAME_SHAPE
 
 
 def turn_of_gravity(x: FloatArray, rate_hz: float) -> tuple[float, float] | None:
@@ -207,22 +235,6 @@ def readout(x: FloatArray) -> Readout:
     sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
     clipped = share_at_limits(values, sigma, resolution)
     return Readout(resolution, sigma, float(np.mean(change == 0.0)), clipped)
-
-
-def tail_error(x: FloatArray) -> float:
-    """Relative standard error of the white noise density of readings ``x`` (n,) due to their excess kurtosis.
-
-    The variance of n independent readings with excess kurtosis κ has the relative variance (2 + κ)/n, of which the
-    spectral likelihood includes 2/n; κ is twice that of differences of neighbours, which slow noise does not affect.
-    """
-    change = np.diff(x)
-    change = change[np.isfinite(change)]
-    square = np.square(change)
-    mean = float(square.mean()) if len(change) else 0.0
-    if mean == 0.0:
-        return 0.0
-    excess = 2.0 * (float(square @ square) / len(change) / mean**2 - 3.0)
-    return 0.5 * math.sqrt(max(excess, 0.0) / len(change))
 
 
 def repeated_rows(x: FloatArray) -> float:

@@ -1,4 +1,4 @@
-"""Slow changes of a static log that are not noise: the warm-up of a bias, a wave, what the temperature explains."""
+"""Slow changes of a static log that are not noise: a warm-up or a step of a bias, a wave, what temperature explains."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.noise import gaps
+from trihedron.estimate.noise.screening import Event
 from trihedron.estimate.noise.spectrum import gauss_markov_density, unit_densities
 from trihedron.session.drift import LEAST_SWING_K
 from trihedron.transforms import cosine_transform
@@ -21,7 +22,7 @@ MEANS = 256
 MEANS_OF_HEAT = 64
 """Number of means that are compared with the temperature: their noise is hardly white."""
 SHORTEST = 4
-"""Fewest means between two breaks."""
+"""Fewest means between two breaks, or steps."""
 HELD = 0.5
 """Least share of them with readings."""
 CORRELATION = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
@@ -30,14 +31,24 @@ TIMES = np.geomspace(0.005, 0.5, 15)
 """Time constants that are tried, in lengths of the log: a slower warm-up is like a straight line or a walk."""
 CYCLES = np.arange(1.0, 16.1, 0.125)
 """Periods in the log that are tried: less than one is drift, more is a line of the spectrum."""
+EXPONENTIAL, WAVE, STEP = KINDS = range(3)
+TRIED = (TIMES, 1.0 / CYCLES, np.arange(SHORTEST, MEANS - SHORTEST + 1) / MEANS)
+"""Time constants, periods and instants that are tried, in lengths of the log."""
+SIZES = (1, 2, 1)
+"""Number of sizes of a change of each kind."""
+PARAMETERS = (2, 3, 3)
+"""Size and time of an exponential; amplitude, phase and period of a wave; size of a step and its instant, which fits
+chance as two parameters do or more, because the likelihood has no curvature along it (Ninomiya 2005)."""
 MOST = 4
 """Most changes of one log: sums of more exponentials cannot be told apart."""
 PLAUSIBLE = float(np.log(MEANS))
-"""Least rise of twice the log-likelihood per parameter (size and time of an exponential; amplitude, phase and period of
-a wave) of a change for which intervals allow: with more it is as likely as none (Schwarz)."""
+"""Least rise of twice the log-likelihood per parameter of a change for which intervals allow: with more it is as likely
+as none (Schwarz)."""
 EARNED = 10.0
 """Least rise per parameter of a change that is stated and subtracted. Chance reaches it in 1e-5 of logs of white noise,
 1e-4 of Gauss-Markov noise, 4e-4 of flicker, 2e-3 of a walk (benches/static_screening.py)."""
+NOTHING = 1e-6
+"""Share of the largest column that rounding leaves of one which is a sum of others."""
 CONVERGED = 0.1
 """Decrease of the deviance below which the times of changes are as likely as can be."""
 MOSTLY = 0.5
@@ -47,42 +58,41 @@ noise, flicker, walk or ramp beside an independent temperature (walk, cycle or c
 
 @dataclass(frozen=True)
 class SlowChange:
-    """A change by ``weights`` of exp(-t/``time_s``), or of cosine and sine of period ``time_s``."""
+    """A change by ``weights`` of exp(-t/T), of cosine and sine of period T, or of a step at T, ``time_s``."""
 
     time_s: float
     weights: tuple[float, ...]
-
-    @property
-    def is_wave(self) -> bool:
-        """Whether it is periodic."""
-        return len(self.weights) > 1
+    kind: int
 
     @property
     def size(self) -> float:
-        """Amplitude."""
-        return float(np.linalg.norm(self.weights))
+        """Amplitude; of a step with its sign."""
+        return self.weights[0] if self.kind == STEP else float(np.linalg.norm(self.weights))
 
     def at(self, t: FloatArray) -> FloatArray:
         """(n,) its value at times (n,) [s] after the first reading."""
-        return np.asarray(self.weights @ _shape(t / self.time_s, is_wave=self.is_wave))
+        return np.asarray(self.weights @ _shape(t, self.time_s, self.kind))
 
     def columns(self, t: FloatArray) -> FloatArray:
-        """(2 or 4, n) what an error of its weights and of its time adds at times (n,) [s]."""
-        shape, late = _shape(t / self.time_s, is_wave=self.is_wave), t / self.time_s
-        return np.vstack([shape, late * shape])
+        """(2 or 4, n) what an error of its weights and of its time adds at times (n,) [s]; not of a step."""
+        shape = _shape(t, self.time_s, self.kind)
+        return np.vstack([shape, t / self.time_s * shape])
 
 
-def _shape(phase: FloatArray, *, is_wave: bool) -> FloatArray:
-    """(1, n) exponential, or (2, n) cosine and sine, at ``phase`` (n,), time over its time."""
-    if is_wave:
+def _shape(t: FloatArray, time: float, kind: int) -> FloatArray:
+    """(1, n) exponential or step, or (2, n) cosine and sine, at times (n,)."""
+    if kind == STEP:
+        return np.asarray(t > time, dtype=np.float64)[np.newaxis]
+    phase = t / time
+    if kind == WAVE:
         return np.stack([np.cos(2.0 * np.pi * phase), np.sin(2.0 * np.pi * phase)])
     return np.exp(-phase)[np.newaxis]
 
 
 def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) -> list[Sequence[SlowChange]]:
-    """Exponentials and waves in readings ``x`` (n,), NaN where missing, that no Gaussian noise explains as well, beside
-    a straight line and a level on each side of the ``breaks`` (numbers of readings): those that are stated and, where
-    more are as likely as not, all of these.
+    """Exponentials, waves and steps in readings ``x`` (n,), NaN where missing, that no Gaussian noise explains as well,
+    beside a straight line and a level on each side of the ``breaks`` (numbers of readings): those that are stated and,
+    where more are as likely as not, all of these.
 
     They are added one by one, each time the one that raises the likelihood most, with all their times fitted anew.
     """
@@ -91,7 +101,7 @@ def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) ->
         return [()]
     found = [means.beside(())]
     while len(found) <= MOST:
-        more = [means.refined(found[-1], is_wave=is_wave) for is_wave in (False, True)]
+        more = [means.refined(found[-1], kind) for kind in KINDS]
         best = min(more, key=lambda one: one.cost(PLAUSIBLE))
         if not best.cost(PLAUSIBLE) < found[-1].cost(PLAUSIBLE):
             break
@@ -102,9 +112,19 @@ def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) ->
 
 
 def without(x: FloatArray, changes: Sequence[SlowChange], rate_hz: float) -> FloatArray:
-    """(n,) readings ``x`` (n,) less the ``changes``."""
+    """(n,) readings ``x`` (n,) less the ``changes``, steps excepted: a level on each side is free."""
     t = np.arange(len(x)) / rate_hz
-    return x - sum((change.at(t) for change in changes), np.zeros(len(x))) if changes else x
+    return x - sum((one.at(t) for one in changes if one.kind != STEP), np.zeros(len(x))) if changes else x
+
+
+def steps_of(changes: Sequence[SlowChange], n: int, rate_hz: float) -> list[Event]:
+    """Steps among the ``changes`` of ``n`` readings, each known to a mean."""
+    out, half = [], 0.5 * n / MEANS
+    for one in changes:
+        if one.kind == STEP:
+            middle = one.time_s * rate_hz
+            out.append(Event(int(middle - half), int(middle + half) + 1, one.size))
+    return out
 
 
 def beside_each(
@@ -117,17 +137,19 @@ def beside_each(
         yield without(x, changes, rate_hz) + (x - without(x, first, rate_hz)), changes
 
 
-Time = tuple[float, bool]
-"""Time constant or period, in lengths of the log, and whether it is a wave's."""
+Time = tuple[float, int]
+"""Time constant, period or instant, in lengths of the log, and its kind."""
 
 
 def _are_apart(times: Sequence[Time]) -> bool:
-    """Whether time constants differ by as much as those tried, and waves by a period in the log, its resolution: nearer
-    ones have sizes of any amount, and opposite."""
-    constants = sorted(time for time, is_wave in times if not is_wave)
-    cycles = sorted(1.0 / time for time, is_wave in times if is_wave)
-    are_constants_apart = all(later >= TIMES[1] / TIMES[0] * time for time, later in pairwise(constants))
-    return are_constants_apart and all(more >= 1.0 + fewer for fewer, more in pairwise(cycles))
+    """Whether time constants differ by as much as those tried, waves by a period in the log, its resolution, and steps
+    by some means: nearer ones have sizes of any amount, and opposite."""
+    constants, periods, instants = (sorted(time for time, of in times if of == kind) for kind in KINDS)
+    return (
+        all(later >= TIMES[1] / TIMES[0] * time for time, later in pairwise(constants))
+        and all(1.0 / shorter >= 1.0 + 1.0 / period for shorter, period in pairwise(periods))
+        and all(later >= time + SHORTEST / MEANS for time, later in pairwise(instants))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,12 +164,12 @@ class Beside:
 
     def cost(self, price: float) -> float:
         """Deviance with ``price`` for every parameter."""
-        return self.deviance + price * sum(2 + is_wave for _, is_wave in self.times)
+        return self.deviance + price * sum(PARAMETERS[kind] for _, kind in self.times)
 
     def changes(self, duration_s: float) -> list[SlowChange]:
         """The changes of a log of ``duration_s``."""
         sizes = iter(self.sizes[1:].tolist())
-        return [SlowChange(time * duration_s, tuple(islice(sizes, 1 + is_wave))) for time, is_wave in self.times]
+        return [SlowChange(time * duration_s, tuple(islice(sizes, SIZES[kind])), kind) for time, kind in self.times]
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,47 +223,53 @@ class Means:
 
     def columns(self, times: Sequence[Time]) -> FloatArray:
         """(c, m) coefficients of a line and of changes of these ``times``."""
-        return self.transformed(np.vstack([self.t, *(self.shape(time, is_wave=is_wave) for time, is_wave in times)]))
+        return self.transformed(np.vstack([self.t, *(self.shape(*time) for time in times)]))
 
-    def shape(self, time: float, *, is_wave: bool) -> FloatArray:
-        """(1 or 2, k) means of an exponential or a wave of ``time`` lengths."""
-        half = 0.5 / (MEANS * time)
+    def shape(self, time: float, kind: int) -> FloatArray:
+        """(1 or 2, k) means of an exponential, a wave or a step at ``time`` lengths."""
         # The mean of a curve over a part is not its middle.
-        mean = np.sinc(2.0 * half) if is_wave else np.sinh(half) / half
-        return np.asarray(mean * _shape(self.t / time, is_wave=is_wave))
+        if kind == STEP:
+            return np.clip((self.t - time) * MEANS + 0.5, 0.0, 1.0)[np.newaxis]
+        half = 0.5 / (MEANS * time)
+        mean = np.sinc(2.0 * half) if kind == WAVE else np.sinh(half) / half
+        return np.asarray(mean * _shape(self.t, time, kind))
 
     @cached_property
-    def tried(self) -> tuple[FloatArray, FloatArray]:
-        """(times, 1, m) and (times, 2, m) coefficients of exponentials of ``TIMES`` and waves of ``CYCLES``."""
-        exponentials = np.stack([self.shape(time, is_wave=False) for time in TIMES])
-        waves = np.stack([self.shape(1.0 / cycles, is_wave=True) for cycles in CYCLES])
-        return self.transformed(exponentials), self.transformed(waves)
+    def tried(self) -> list[FloatArray]:
+        """(times, sizes, m) coefficients of the changes of each kind that are tried."""
+        return [self.transformed(np.stack([self.shape(time, kind) for time in TRIED[kind]])) for kind in KINDS]
 
-    def refined(self, known: Beside, *, is_wave: bool) -> Beside:
+    def refined(self, known: Beside, kind: int) -> Beside:
         """The ``known`` changes and one more: first the best of those tried, beside the noise as it was, then all times
         and the noise in turn while the deviance falls."""
         across = np.linalg.qr((self.columns(known.times) / known.sigma).T)[0]
-        tried = self.tried[is_wave] / known.sigma
-        tried = np.linalg.qr(np.swapaxes(tried - tried @ across @ across.T, 1, 2))[0]
-        gain = np.sum((self.coefficients / known.sigma @ tried) ** 2, axis=1)
-        more = [[*known.times, (float(time), is_wave)] for time in (1.0 / CYCLES if is_wave else TIMES)]
+        tried = self.tried[kind] / known.sigma
+        largest = np.linalg.norm(tried, axis=2).max()
+        tried, left = np.linalg.qr(np.swapaxes(tried - tried @ across @ across.T, 1, 2))
+        # A step at a break of the log, where either side has its own level, changes nothing.
+        is_seen = np.abs(np.diagonal(left, axis1=1, axis2=2)).min(axis=1) > NOTHING * largest
+        gain = is_seen * np.sum((self.coefficients / known.sigma @ tried) ** 2, axis=1)
+        more = [[*known.times, (float(time), kind)] for time in TRIED[kind]]
         found = self.beside(more[int(np.argmax(gain * [_are_apart(times) for times in more]))])
-        while True:
+        while found.deviance < known.deviance - 0.5 * PLAUSIBLE * PARAMETERS[kind]:
             better = self.beside(self._times(found))
             if better.deviance > found.deviance - CONVERGED:
                 return min(better, found, key=lambda one: one.deviance)
             found = better
+        return found
 
     def _times(self, found: Beside) -> list[Time]:
         """The most likely times near those ``found``, beside its noise."""
         # Imported here: commands that read a log start faster.
         from scipy.optimize import Bounds, minimize
 
-        kinds = [is_wave for _, is_wave in found.times]
-        least = np.log(np.where(kinds, 1.0 / CYCLES[-1], TIMES[0])) - 0.1
-        most = np.log(np.where(kinds, 1.0 / CYCLES[0], TIMES[-1])) + 0.1
+        kinds = [kind for _, kind in found.times]
+        beyond = np.where(np.equal(kinds, STEP), 0.0, 0.1)
+        least = np.log([min(TRIED[kind]) for kind in kinds]) - beyond
+        most = np.log([max(TRIED[kind]) for kind in kinds]) + beyond
         # Steps as those between the times that are tried.
-        start, step = np.log([time for time, _ in found.times]).clip(least, most), np.where(kinds, 0.01, 0.3)
+        start = np.log([time for time, _ in found.times]).clip(least, most)
+        step = np.where(np.equal(kinds, STEP), 0.5 / MEANS * np.exp(-start), np.array([0.3, 0.01, 0.0])[kinds])
         simplex = np.vstack([start, start + np.diag(np.where(start + step < most, step, -step))])
 
         def times(logs: FloatArray) -> list[Time]:

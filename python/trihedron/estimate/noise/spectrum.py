@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -120,37 +120,43 @@ def unit_densities(frequency_hz: FloatArray, order: IntArray, length: int, step_
 
 
 def ordinates(
-    x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]], changes: Sequence[SlowChange] = ()
+    x: FloatArray,
+    rate_hz: float,
+    stretches: Sequence[tuple[int, int]],
+    changes: Sequence[SlowChange] = (),
+    head: tuple[FloatArray, float] | None = None,
 ) -> list[Ordinates]:
     """Bands of all stretches ``[start, stop)`` of one channel ``x`` (n,), with columns for its slow ``changes``; NaN
-    marks a missing reading.
+    marks a missing reading. Where ``x`` are means, ``head`` are the first readings (k,) and their rate.
 
     Raises ``InputError`` when no stretch is long enough for a spectrum.
     """
+    fast, fast_hz = (x, rate_hz) if head is None else head
+    parts = stretches if head is None else [(0, len(fast))]
     total = sum(stop - start for start, stop in stretches)
-    block = -(-total // LONGEST_TRANSFORM) if total > LONGEST_TRANSFORM else 1
+    length = max(-(-total // LONGEST_TRANSFORM), 1)
     used = USED_SHARE
     if scattered_loss(x) > MOST_BRIDGED:
-        block = max(block, SCATTERED_BLOCK)
+        length = max(length, SCATTERED_BLOCK)
         # With losses, slow noise masks fast noise: only the means are used, up to half their ordinates.
         used = 2 if slow_over_fast(x) > MOST_SLOW else USED_SHARE
-    bands, (even, _) = list[Ordinates](), evenness(x)
+    bands, step_s = list[Ordinates](), length / rate_hz
+    block = round(step_s * fast_hz)
     for start, stop in stretches:
-        runs = block_means(x[start:stop], block)
-        step_s, start_s = block / rate_hz, start / rate_hz
-        bands += [_whole(run, step_s, block, (start_s, changes), used) for run in runs if len(run.means) >= 32]
+        runs, slow = block_means(x[start:stop], length), (start / rate_hz, changes)
+        bands += [_whole(run, step_s, block, slow, used) for run in runs if len(run.means) >= 32]
     if block > 1 and used == USED_SHARE:
-        bands += _segments(x, rate_hz, stretches, block, _n_columns(changes))
+        bands += _segments(fast, fast_hz, parts, block, _n_columns(changes))
     if not bands:
         raise InputError(
             f"no stretch of the log is long enough to separate noise terms: the longest has "
             f"{max((b - a for a, b in stretches), default=0)} readings; record longer or exclude less"
         )
-    return [replace(band, count=even * band.count) for band in bands]
+    return bands
 
 
-def spread_of_mean(even: float) -> float:
-    """Relative standard error of a mean power over the pieces of a log of this evenness."""
+def error_of_mean(even: float) -> float:
+    """Relative standard error of a mean power over the pieces of a log, beyond that of Gaussian noise of one level."""
     return math.sqrt((1.0 / even - 1.0) / PIECES)
 
 
@@ -158,9 +164,9 @@ PIECES = 64
 
 
 def evenness(x: FloatArray) -> tuple[float, float]:
-    """Share of the degrees of freedom of ``x`` (n,) that a level of noise which changes along the log leaves: (mean s)²
-    over mean s², s the powers of the differences of readings in pieces, without their own scatter; and the level of the
-    loudest piece over that of the quietest."""
+    """Share of the degrees of freedom of ``x`` (n,) that long tails, and a level of noise which changes along the log,
+    leave: (mean s)² over mean s², s the powers of the differences of readings in pieces, without the scatter that
+    Gaussian readings have; and the level of the loudest piece over that of the quietest."""
     length = len(x) // PIECES
     step = np.diff(x[: length * PIECES].reshape(PIECES, length), axis=1) ** 2
     count = np.isfinite(step).sum(axis=1)
@@ -171,25 +177,6 @@ def evenness(x: FloatArray) -> tuple[float, float]:
     # Squared differences of white noise are correlated: their mean has 2/3 of a degree of freedom each.
     excess = float(np.var(power) / np.mean(power) ** 2 - np.mean(3.0 / count[full]))
     return 1.0 / (1.0 + max(excess, 0.0)), math.sqrt(float(power.max()) / max(float(power.min()), TINY))
-
-
-def ordinates_of_means(
-    log: tuple[FloatArray, float],
-    block: int,
-    stretches: Sequence[tuple[int, int]],
-    head: FloatArray,
-    changes: Sequence[SlowChange],
-) -> list[Ordinates]:
-    """Bands of a ``log`` from means (k,) of ``block`` readings, its rate, and its first readings ``head`` (n,).
-
-    ``stretches`` are indices of means.
-    """  # fmt: skip
-    means, rate_hz = log
-    step_s = block / rate_hz
-    bands = [_whole(Run(a, means[a:b], 0.0, 0.0), step_s, block, (0.0, changes)) for a, b in stretches if b - a >= 32]
-    if block > 1:
-        bands += _segments(head, rate_hz, [(0, len(head))], block, _n_columns(changes))
-    return bands
 
 
 def _whole(

@@ -9,7 +9,6 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import (
     STREAM_BUDGET_BYTES,
     as_readings,
@@ -81,7 +80,6 @@ def _axis(stream: _core.AllanStream, c: int, mean: float, head: FloatArray, curv
     rate_hz, n = curve.rate_hz, curve.n_samples
     blank = blank_axis(curve.names[c], curve.units[c], rate_hz, n, mean, readout(head))
     means, size = stream.means(c, -(-n // LONGEST_TRANSFORM))
-    channel = Channel(means, rate_hz / size, blank.name, blank.unit, head=head, block=size)
+    channel = Channel(means, rate_hz / size, blank.name, blank.unit, head=head)
     steps, _ = sudden_changes(means, channel.rate_hz)
-    findings = list(remarks.events(steps, [], [], channel.rate_hz, blank.unit))
-    return replace(channel, steps=steps, findings=findings).without_changes().identified(blank, curve, c)
+    return replace(channel, steps=steps).without_changes().identified(blank, curve, c)

@@ -13,7 +13,7 @@ _LOG = {
         "N and Q then depend on the resampling; log at the sensor's own rate.",
     ),
     ("log-uneven", "", WARNING): Words(
-        "The noise changes along the log: of 64 pieces the loudest has {ratio:.2g} times that of the quietest.",
+        "The noise changes along the log: its loudest part has {ratio:.2g} times that of the quietest.",
         "vibration that comes and goes (a fan, a machine), or a range or filter that changed.",
         "N is a mean over these levels; leave one of them: `trihedron allan LOG --exclude FROM:TO`.",
     ),
