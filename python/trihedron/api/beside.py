@@ -20,7 +20,7 @@ from trihedron.api.referring import (
 from trihedron.api.simulating import names_scenario
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.reference.fit import moves_along
-from trihedron.estimate.reference.gyroscope import poses_at_rest
+from trihedron.estimate.reference.start import poses_at_rest
 from trihedron.read.reference.motion import of_recording
 from trihedron.records import Calibration, Finding, Recording
 from trihedron.records.reference import AgainstReference

@@ -12,7 +12,7 @@ from trihedron.api.reading import AnyRecording, recording_of, segment
 from trihedron.api.referring import AnyReference, calibration_by, motion_of
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.estimate.reference import fit_references, turns_of_frame
+from trihedron.estimate.reference import fit_references
 from trihedron.estimate.verification import reference_findings
 from trihedron.records import Frame
 from trihedron.records.reference import AgainstReference, FitToReference
@@ -86,18 +86,21 @@ def _with_repeatability(fits: Sequence[FitToReference]) -> FitToReference:
 
 
 def _averaged(found: Sequence[AgainstReference]) -> FitToReference | None:
-    """Weighted mean of S and b, its covariance widened by their disagreement; the frame is that of the shared gyro."""
-    seen = [(one.accelerometer, one.frame_covariance) for one in found if one.accelerometer is not None]
+    """Weighted mean of S and b, its covariance widened by their disagreement; errors of the shared gyro are common."""
+    seen = [one for one in found if one.accelerometer is not None]
     if not seen:
         return None
-    fits = [fit for fit, _ in seen]
-    of_frame = [J @ frame @ J.T for J, frame in ((turns_of_frame(fit.S, fit.b), frame) for fit, frame in seen)]
+    fits = [one.accelerometer for one in seen if one.accelerometer is not None]
+    of_gyro = [
+        X @ np.linalg.pinv(one.gyroscope.covariance, hermitian=True) @ X.T
+        for one, X in ((one, one.cross_covariance) for one in seen)
+    ]
     theta: list[FloatArray] = [np.concatenate([fit.S.ravel(), fit.b]) for fit in fits]
     weights = [
-        np.linalg.pinv(fit.covariance - shared, hermitian=True) for fit, shared in zip(fits, of_frame, strict=True)
+        np.linalg.pinv(fit.covariance - shared, hermitian=True) for fit, shared in zip(fits, of_gyro, strict=True)
     ]
     covariance = np.linalg.pinv(np.sum(weights, axis=0), hermitian=True)
     mean = covariance @ np.sum([w @ t for w, t in zip(weights, theta, strict=True)], axis=0)
     chi2 = sum(float((t - mean) @ w @ (t - mean)) for w, t in zip(weights, theta, strict=True))
     wide = max(1.0, chi2 / max(12 * (len(fits) - 1), 1))
-    return replace(fits[0], S=mean[:9].reshape(3, 3), b=mean[9:], covariance=wide * covariance + of_frame[0])
+    return replace(fits[0], S=mean[:9].reshape(3, 3), b=mean[9:], covariance=wide * covariance + of_gyro[0])

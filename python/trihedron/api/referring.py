@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
 from trihedron.api.reading import read
-from trihedron.arrays import FloatArray
 from trihedron.comparison.fitted import FittedModel, FittedSensor, model_of_calibration
 from trihedron.comparison.parameters import compare_numbers
 from trihedron.errors import InputError
-from trihedron.estimate.reference import fit_reference, turns_of_frame
+from trihedron.estimate.reference import fit_reference
 from trihedron.read import ReadError
 from trihedron.read.reference.motion import of_recording, read_reference
 from trihedron.records import Calibration, Finding, Frame, Recording, SensorCalibration
@@ -106,26 +104,11 @@ def calibration_by(
         findings, wanted = (*findings, finding), "case"
     covariance = np.zeros((24, 24))
     covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
-    if fitted is not None:
-        # An error of the reference's body frame rotates both sensors alike.
-        of_force, of_rate = (turns_of_frame(one.S, one.b) for one in (accelerometer, gyroscope))
-        sides = (accelerometer.covariance, of_force), (gyroscope.covariance, of_rate)
-        covariance[:12, 12:] = of_force @ _contained(found.frame_covariance, sides) @ of_rate.T
-        covariance[12:, :12] = covariance[:12, 12:].T
+    covariance[:12, 12:], covariance[12:, :12] = found.cross_covariance, found.cross_covariance.T
     calibration = Calibration(
         accelerometer, gyroscope, covariance, "case", gravity, source, recording.source, recording.sha256, findings
     )
     return in_frame(calibration, wanted)
-
-
-def _contained(frame: FloatArray, sides: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """Covariance (3, 3) of a rotation of both sensors, no larger than either's own covariance (12, 12) contains along
-    its change (12, 3) by the rotation: ``T F Tᵀ ≤ C`` where ``F ≤ (Tᵀ C⁻¹ T)⁻¹``, so that all of both is positive."""
-    for own, turns in sides:
-        half = np.linalg.cholesky(np.linalg.inv(turns.T @ np.linalg.pinv(own, hermitian=True) @ turns))
-        values, vectors = np.linalg.eigh(np.linalg.solve(half, np.linalg.solve(half, frame).T))
-        frame = half @ (vectors * np.clip(values, 0.0, 1.0)) @ vectors.T @ half.T
-    return frame
 
 
 def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, Finding]:

@@ -194,8 +194,8 @@ class AgainstReference(Plain):
     ``clock_offset_s``: by how much the reference's clock is ahead at ``clock_middle_s`` of the log, and its σ.
     ``earth_rate``: along the axes of the reference's world, where the log determines it; else it is included in the
     uncertainties of the gyro's parameters.
-    ``frame_covariance`` (3, 3) [rad²]: of the constant rotation error of the reference's body, which is included in
-    the uncertainties of both sensors.
+    ``cross_covariance`` (12, 12) of the accelerometer's S and b with the gyro's: a constant rotation error of the
+    reference's body rotates both.
     """
 
     kind: str
@@ -215,18 +215,13 @@ class AgainstReference(Plain):
     error: ReferenceError
     bias: BiasOverTime
     findings: tuple[Finding, ...] = ()
-    residual_time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
-    residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     earth_rate: Estimate | None = None
-    frame_covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+    cross_covariance: FloatArray = field(default_factory=lambda: np.zeros((12, 12)))
     apart: ErrorOverTime = NOWHERE
     LAYOUT: ClassVar[Layout] = Layout(
         {},
         lambda found, _: {"clock": found.clock()},
-        (
-            *("clock_offset_s", "clock_middle_s", "clock_rate_ppm", "findings", "residual_time_s", "residual_rate"),
-            *("frame_covariance", "apart"),
-        ),
+        ("clock_offset_s", "clock_middle_s", "clock_rate_ppm", "findings", "cross_covariance", "apart"),
     )
 
     def clock(self) -> dict[str, Any]:

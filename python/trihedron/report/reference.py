@@ -13,7 +13,6 @@ from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, 
 from trihedron.report.calibration import calibration_report, shared_power
 from trihedron.report.chart import AXIS_COLOURS, TWO_SIGMA, Band, Chart, Level, Line, Mark, Panel, Scale, Span
 from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
-from trihedron.report.drawn import envelope
 from trihedron.report.names import axis_in_print, id_in_print
 from trihedron.report.numbers import (
     capital,
@@ -68,9 +67,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
     blocks: list[Block] = [Facts(tuple(facts)), _matrix("Gyro", "ω", "rad/s", found.gyroscope)]
     if found.accelerometer is not None:
         blocks.append(_matrix("Accelerometer", "f", "m/s²", found.accelerometer))
-    blocks += [_effect(ident, one) for ident, one in found.effects.items()]
-    caption = "Residual of the rate, window by window."
-    return (*blocks, Picture("reference", caption, partial(residual_chart, found)))
+    return (*blocks, *(_effect(ident, one) for ident, one in found.effects.items()))
 
 
 def errors_beside(references: Sequence[AgainstReference]) -> str:
@@ -281,16 +278,3 @@ def error_chart(found: AgainstReference) -> Chart:
         marks.append(Line(apart.time_s, DEGREES * apart.angle[:, k], XYZ[k], colour))
     x = Scale("time [s]", "s", limits=(float(ends[0]), float(ends[1])))
     return Chart((Panel(x, Scale("reference − gyro [°]", "°"), tuple(marks), height_px=240),))
-
-
-def residual_chart(found: AgainstReference) -> Chart:
-    """Residual rate over time, one panel per axis."""
-    left = DEGREES * found.residual_rate
-    reach = 1.3 * float(np.percentile(np.abs(left), 99.5))
-    panels = []
-    x = Scale("time [s]", "s", limits=(float(found.residual_time_s[0]), float(found.residual_time_s[-1])))
-    for k in range(3):
-        marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
-        y = Scale(f"rate residual {XYZ[k]} [°/s]", "°/s", limits=(-reach, reach))
-        panels.append(Panel(x, y, marks, height_px=110))
-    return Chart(tuple(panels), is_linked=True, legend=False)

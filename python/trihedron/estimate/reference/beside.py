@@ -79,6 +79,11 @@ class Point:
         return np.asarray(far < 0.5 * max(block_s, BLOCK_S))
 
 
+def without_effects(point: Point) -> Point:
+    """The point with effects at 0."""
+    return replace(point, g=np.zeros((3, 3)), bend=np.zeros(6))
+
+
 @dataclass(frozen=True, eq=False)
 class Beside:
     """A log on its grid, its reference, valid samples ``seen`` (n,), initial values ``start``, and the specific force
@@ -204,7 +209,7 @@ class Beside:
 
     def _prior(self, name: str) -> FloatArray:
         """Prior mean (k,) of a parameter: the initial value, and 0 for effects."""
-        return self.values(replace(self.start, g=np.zeros((3, 3)), bend=np.zeros(6)), name)
+        return self.values(without_effects(self.start), name)
 
     def attitudes(self, point: Point) -> tuple[FloatArray, FloatArray]:
         """Times (m,) of the log and the reference's attitudes (m, 3, 3) there; a reference rate is integrated."""

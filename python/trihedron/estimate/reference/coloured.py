@@ -7,6 +7,7 @@ model can make an estimate worse than ordinary least squares; a jackknife over b
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
@@ -50,13 +51,11 @@ class Solution:
     model: NoiseModel
 
 
-def solve(
-    design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel | None = None
-) -> Solution:
+def solve(design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray) -> Solution:
     """Estimate θ of ``target (k, 3) = design (k, 3, p) θ``.
 
-    ``index`` (k,) numbers the windows, gaps included; ``size`` (k,) is the motion with which noise may grow; ``model``
-    the noise model where it is fixed. Raises ``InputError`` when there are too few rows for the parameters.
+    ``index`` (k,) numbers the windows, gaps included; ``size`` (k,) is the motion with which noise may grow. Raises
+    ``InputError`` when there are too few rows for the parameters.
     """
     k, _, p = design.shape
     if 3 * k < 2 * p + 30:
@@ -64,9 +63,8 @@ def solve(
     scale = np.sqrt(np.mean(design**2, axis=(0, 1)))
     scale[scale == 0.0] = 1.0
     X = design / scale
-    tried = [NoiseModel(grows, order) for grows in (False, True) for order in ORDERS] if model is None else [model]
     best: tuple[float, Solution] | None = None
-    for one in tried:
+    for one in (NoiseModel(grows, order) for grows in (False, True) for order in ORDERS):
         if one.order * ROWS_PER_POLE > k:
             continue
         spread, solution = _solve(X, target, index, size, one)
@@ -85,20 +83,22 @@ def _solve(
     k, _, p = X.shape
     used = np.ones(k, dtype=bool)
     weight = np.ones(k)
-    theta = _least_squares(X.reshape(-1, p), target.ravel())
+    flat = X.reshape(-1, p)
+    theta = _least_squares(flat, target.ravel())
     for _ in range(2):
         r = target - X @ theta
         weight = _weights(r, size, used) if model.grows else np.ones(k)
         length = np.linalg.norm(r * weight[:, None], axis=1)
-        used = _without_outliers(length)
+        used = without_outliers(length)
         rows = np.repeat(used, 3)
         w = np.repeat(weight, 3)[rows]
-        theta = _least_squares(X.reshape(-1, p)[rows] * w[:, None], target.ravel()[rows] * w)
-    Xw, yw = X * weight[:, None, None], target * weight[:, None]
+        theta = _least_squares(flat[rows] * w[:, None], target.ravel()[rows] * w)
     for _ in range(2 if model.order else 1):
-        r = yw - Xw @ theta
+        r = (target - X @ theta) * weight[:, None]
         filters = [_autoregression(r[:, axis], index, used, model.order) for axis in range(3)]
-        Z, y, at = _whitened(Xw, yw, index, used, filters)
+        white, at = _whitening(index, used, filters)
+        white = white * np.repeat(weight, 3)
+        Z, y = white @ flat, white @ target.ravel()
         theta = _least_squares(Z, y)
     left = y - Z @ theta
     variance = float(left @ left) / max(len(left) - p - 3 * model.order, 1)
@@ -113,7 +113,7 @@ def _solve(
     widened = float(np.median(wide))
     spread = float(np.mean(np.log(np.maximum(jackknife, predicted)[is_known]))) if np.any(is_known) else np.inf
     covariance = variance * inverse * np.outer(wide, wide)
-    influence = _influence(inverse @ Z.T, index, used, filters) * weight[:, None]
+    influence = (white.T @ (Z @ inverse)).T.reshape(p, k, 3)
     return spread, Solution(theta, covariance, influence, target - X @ theta, used, widened, held_out, model)
 
 
@@ -136,7 +136,8 @@ def _weights(r: FloatArray, size: FloatArray, used: BoolArray) -> FloatArray:
     return np.asarray(np.median(scale) / scale, dtype=np.float64)
 
 
-def _without_outliers(length: FloatArray) -> BoolArray:
+def without_outliers(length: FloatArray) -> BoolArray:
+    """Which of residuals of three components, of these lengths (k,), are neither outliers nor beside one."""
     limit = OUTLIER * float(np.median(length)) / 1.538  # the median length of three standard normals
     odd = length > limit
     if odd.mean() > MOST_OUT:
@@ -166,28 +167,18 @@ def _with_past(index: IntArray, used: BoolArray, order: int) -> IntArray:
     return np.asarray(rows[near & (bad[rows + 1] == bad[rows - order])], dtype=np.int64)
 
 
-def _whitened(
-    X: FloatArray, y: FloatArray, index: IntArray, used: BoolArray, filters: list[FloatArray]
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    Z, z, rows_of = [], [], []
+def _whitening(index: IntArray, used: BoolArray, filters: list[FloatArray]) -> tuple[csr_array, IntArray]:
+    """Matrix (m, 3 k) that whitens rows (k, 3) in order, and the window (m,) of each whitened row."""
+    values, columns, lengths, rows_of = [], [], [], []
     for axis, f in enumerate(filters):
         rows = _with_past(index, used, len(f) - 1)
-        Z.append(sum(c * X[rows - lag, axis] for lag, c in enumerate(f)))
-        z.append(sum(c * y[rows - lag, axis] for lag, c in enumerate(f)))
+        values.append(np.tile(f, len(rows)))
+        columns.append((3 * (rows[:, None] - np.arange(len(f))) + axis).ravel())
+        lengths.append(np.full(len(rows), len(f)))
         rows_of.append(rows)
-    return np.concatenate(Z), np.concatenate(z), np.concatenate(rows_of)
-
-
-def _influence(of_white: FloatArray, index: IntArray, used: BoolArray, filters: list[FloatArray]) -> FloatArray:
-    """Derivative (p, k, 3) of θ by the rows before whitening, from that by the whitened rows."""
-    out = np.zeros((len(of_white), len(index), 3))
-    first = 0
-    for axis, f in enumerate(filters):
-        rows = _with_past(index, used, len(f) - 1)
-        for lag, c in enumerate(f):
-            out[:, rows - lag, axis] += c * of_white[:, first : first + len(rows)]
-        first += len(rows)
-    return out
+    first = np.concatenate([[0], np.cumsum(np.concatenate(lengths))])
+    of = np.concatenate(values), np.concatenate(columns), first
+    return csr_array(of, shape=(len(first) - 1, 3 * len(index))), np.concatenate(rows_of)
 
 
 def _blocks(index: IntArray) -> IntArray:

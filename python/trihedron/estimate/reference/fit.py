@@ -11,35 +11,30 @@ from trihedron.arrays import AXES, BoolArray, FloatArray, rms_of
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer, force_along
 from trihedron.estimate.reference.beside import Beside, Point
 from trihedron.estimate.reference.clocks import Alignment, align
-from trihedron.estimate.reference.coloured import Solution
-from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope, held_out
+from trihedron.estimate.reference.coloured import without_outliers
 from trihedron.estimate.reference.mismatch import (
     reject_still,
     reject_strangers,
     reject_two_clocks,
     reject_units,
-    share_left,
 )
 from trihedron.estimate.reference.motion import ALWAYS, EFFECTS, MotionFit, Scored, fit_motion, scores
+from trihedron.estimate.reference.residuals import fine_s, rate_left, validated
 from trihedron.estimate.reference.slip import slip_of
 from trihedron.estimate.reference.smoothed import (
     bias_over_time,
     error_carried,
     error_over_time,
-    frame_covariance,
     without_slow_error,
 )
-from trihedron.estimate.reference.together import Grid, Reference, Windows, grid_of, plateaus, windows_on
+from trihedron.estimate.reference.start import Start, start_of
+from trihedron.estimate.reference.together import Grid, Reference, Windows, grid_of, plateaus, windows_beside
 from trihedron.estimate.reference.worth import earth_of, error_of, remarks
 from trihedron.records import Recording
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceMotion
 from trihedron.sensor_model import reframing
 
-MOST_WINDOWS = 20_000
-"""Most windows; a longer log has longer windows: 0.18 s for an hour, still short for motion by hand."""
-FINEST = 4
-"""Fewest samples between windows: a cubic B-spline over 16 samples has a summation error of 1e-6."""
-FORCE_WINDOW_S = 0.1
+WINDOW_S = 0.1
 """Least spacing of windows for forces, up to 5 Hz: above it a twice differentiated position is noise."""
 TURNED_ROUND = 0.2
 """Residual share of the motion above which the inverse attitude is tried: shared motion leaves some 0.01."""
@@ -52,15 +47,14 @@ LABELS = {
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A log aligned with its reference: initial values of the model, and the fits by windows."""
+    """A log aligned with its reference, and initial values of the model."""
 
     recording: Recording
     gravity_m_s2: float
     side: Beside
-    gyro: GyroFit
+    gyro: Start
     force: ForceFit | None
     windows: Windows
-    wide: Windows
     alignment: Alignment
     seen: BoolArray
     is_turned: bool
@@ -125,39 +119,42 @@ def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float
     seen = grid.is_valid & reference.covers(time)
     if motion.is_stepwise:
         seen &= plateaus(grid, reference, time)
-    windows = _windows(grid, reference, seen)
-    clock = 0 if motion.is_stepwise else 2
-    gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=clock)
-    reference, gyro, is_turned = _right_way_round(grid, reference, windows, gyro, clock)
+    gyro = start_of(grid, reference, seen, found)
+    reference, gyro, is_turned = _right_way_round(grid, reference, seen, gyro)
     motion = reference.motion
     reject_strangers(gyro, motion)
     reject_units(recording, gyro, motion)
-    reject_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
-    wide = windows_on(seen, grid.step_s, max(windows.spacing, round(FORCE_WINDOW_S / grid.step_s)))
-    force = fit_accelerometer(grid, reference, wide, gyro.offset_s, gyro.rate, gravity_m_s2, gyro.handedness)
-    felt = None if force is None else force_along(grid, force, gyro.A, gravity_m_s2)
+    reject_still(motion, gyro.S, gyro.covariance)
+    windows = windows_beside(grid, reference, seen, WINDOW_S)
+    force = fit_accelerometer(grid, reference, windows, gyro.clock, gravity_m_s2, gyro.handedness)
+    felt = None if force is None else force_along(grid, force, gyro.S, gravity_m_s2)
     has_truth = grid.is_valid if motion.attitude is not None else seen
-    side = Beside(grid, reference, has_truth, Point(gyro.A, gyro.a, gyro.offset_s, gyro.rate), felt)
-    return Prepared(recording, gravity_m_s2, side, gyro, force, windows, wide, found, seen, is_turned)
+    side = Beside(grid, reference, has_truth, Point(gyro.S, gyro.b, gyro.clock.offset_s, gyro.clock.rate), felt)
+    return Prepared(recording, gravity_m_s2, side, gyro, force, windows, found, seen, is_turned)
 
 
 def _answer(
     one: Prepared, found: MotionFit, k: int, effects: list[Scored], given: tuple[FloatArray, FloatArray] | None
 ) -> AgainstReference:
-    side, motion, force = one.side, one.side.reference.motion, one.force
+    side, point, motion, force = one.side, found.points[k], one.side.reference.motion, one.force
     S, b = found.value(k, "S").reshape(3, 3), found.value(k, "b")
     covariance = found.covariance(k, ("S", "b"))
-    has_clock = "clock" in found.places[k]
-    clock = found.value(k, "clock") if has_clock else np.array([one.gyro.offset_s, 0.0])
+    has_clock, cross = "clock" in found.places[k], np.zeros((12, 12))
+    clock = found.value(k, "clock") if has_clock else np.array([point.offset_s, 0.0])
     sigma = np.sqrt(np.diag(found.covariance(k, ("clock",)))) if has_clock else np.array([np.nan, np.nan])
-    frame = frame_covariance(found, k)
     if force is not None:
         known, rate = without_slow_error(found, k), float(clock[1])
-        offset = float(clock[0]) - rate * (side.middle_s if has_clock else 0.0)
-        force = fit_accelerometer(side.grid, known, one.wide, offset, rate, one.gravity_m_s2, one.gyro.handedness)
+        steady = replace(one.alignment, offset_s=float(clock[0]) - rate * side.middle_s * has_clock, rate=rate)
+        force = fit_accelerometer(side.grid, known, one.windows, steady, one.gravity_m_s2, one.gyro.handedness)
     if force is not None:
-        force = force.with_error(error_carried(found, k, force, side.grid.time_s[one.wide.middle], frame))
-    up = None if force is None or force.up_covariance is None else _estimate(force.up, force.up_covariance, "1")
+        carried, cross = error_carried(found, k, force, side.grid.time_s[one.windows.middle])
+        force = replace(force, covariance=force.covariance + carried)
+    replay, rms_held_out = validated(found, k, given)
+    _, left = rate_left(side, point)
+    used = without_outliers(np.linalg.norm(left, axis=1))
+    gyroscope = FitToReference(
+        S, b, covariance, rms_of(left[used]), rms_held_out, 0.5 / fine_s(side), len(left), int(np.sum(~used)), 1.0
+    )
     result = AgainstReference(
         kind=motion.kind,
         source=motion.source,
@@ -166,21 +163,17 @@ def _answer(
         clock_rate_ppm=(1e6 * float(clock[1]), 1e6 * float(sigma[1])) if has_clock else None,
         overlap_s=float(one.seen.sum()) * side.grid.step_s,
         correlation=one.alignment.correlation,
-        gyroscope=_fit(S, b, covariance, one.gyro.solution, one.windows),
-        accelerometer=None if force is None else _fit(force.S, force.b, force.covariance, force.solution, one.wide),
+        gyroscope=gyroscope,
+        accelerometer=None if force is None else _accelerometer(force, one.windows),
         mounting=_mounting(S, b, covariance),
-        lever_arm=None
-        if force is None or force.arm_covariance is None
-        else _estimate(force.arm, force.arm_covariance, "m"),
-        vertical=up,
+        lever_arm=None if force is None else force.arm,
+        vertical=None if force is None else force.up,
         earth_rate=_earth(found, effects, k),
         effects=MappingProxyType(_estimates(found, k, effects)),
-        replay=() if motion.attitude is None else held_out(one.side, one.seen, one.gyro, given, _windows),
-        frame_covariance=frame,
+        replay=replay,
+        cross_covariance=cross[:12],
         error=error_of(found, k),
         bias=bias_over_time(found, k),
-        residual_time_s=side.grid.time_s[one.windows.middle],
-        residual_rate=one.gyro.solution.residual,
         apart=error_over_time(found, k),
     )
     slip = slip_of(found, k, result.error)
@@ -200,39 +193,27 @@ def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
     grid, reference = grid_of(recording), Reference(motion)
     found = align(grid, reference, _stamped(recording, motion))
     time = grid.time_s * (1.0 + found.rate) + found.offset_s
-    windows = _windows(grid, reference, grid.is_valid & reference.covers(time))
-    gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=1)
+    gyro = start_of(grid, reference, grid.is_valid & reference.covers(time), found)
     reject_strangers(gyro, motion)
     # With little rotation two logs resemble each other by chance.
-    reject_still(motion, gyro.A.ravel(), gyro.solution.covariance[:9, :9])
+    reject_still(motion, gyro.S, gyro.covariance)
     return found.correlation
 
 
-def _right_way_round(
-    grid: Grid, reference: Reference, windows: Windows, gyro: GyroFit, clock: int
-) -> tuple[Reference, GyroFit, bool]:
+def _right_way_round(grid: Grid, reference: Reference, seen: BoolArray, gyro: Start) -> tuple[Reference, Start, bool]:
     """The reference as given, or with inverted attitudes (given as world to body) where only these fit the log."""
     attitude = reference.motion.attitude
-    if attitude is None or share_left(gyro) < TURNED_ROUND:
+    if attitude is None or gyro.share_left < TURNED_ROUND:
         return reference, gyro, False
     other = Reference(replace(reference.motion, attitude=np.ascontiguousarray(np.swapaxes(attitude, 1, 2))))
-    turned = fit_gyroscope(grid, other, windows, gyro.offset_s, gyro.rate, clock=clock)
-    if share_left(turned) < 0.5 * share_left(gyro):
-        return other, turned, True
-    return reference, gyro, False
+    turned = start_of(grid, other, seen, gyro.clock)
+    return (other, turned, True) if turned.share_left < 0.5 * gyro.share_left else (reference, gyro, False)
 
 
 def _stamped(recording: Recording, motion: ReferenceMotion) -> float | None:
     """Offset of the clocks by both logs' timestamps [s]; ``None`` where these have no common epoch."""
     offset = recording.start_epoch_s - motion.start_epoch_s
     return offset if abs(offset) < 0.5 * max(recording.duration_s, motion.time_s[-1]) else None
-
-
-def _windows(grid: Grid, reference: Reference, seen: BoolArray) -> Windows:
-    spacing = max(FINEST, int(np.ceil(len(grid.time_s) / MOST_WINDOWS)))
-    if not reference.motion.is_stepwise:
-        spacing = max(spacing, int(np.ceil(2.0 * reference.step_s / grid.step_s)))
-    return windows_on(seen, grid.step_s, spacing)
 
 
 def _own_counts(offset: float, recording: Recording, motion: ReferenceMotion) -> float:
@@ -250,17 +231,13 @@ def _earth(found: MotionFit, effects: list[Scored], k: int) -> Estimate | None:
     return earth_of(found, k)
 
 
-def _estimate(value: FloatArray | None, covariance: FloatArray, unit: str) -> Estimate | None:
-    return None if value is None else Estimate(AXES, value, covariance, unit)
-
-
-def _fit(S: FloatArray, b: FloatArray, covariance: FloatArray, solution: Solution, windows: Windows) -> FitToReference:
-    used = solution.residual[solution.is_used]
+def _accelerometer(force: ForceFit, windows: Windows) -> FitToReference:
+    solution = force.solution
     return FitToReference(
-        S=S,
-        b=b,
-        covariance=np.asarray(covariance[:12, :12]),
-        rms=rms_of(used),
+        S=force.S,
+        b=force.b,
+        covariance=force.covariance[:12, :12],
+        rms=rms_of(solution.residual[solution.is_used]),
         rms_held_out=solution.rms_held_out,
         band_hz=0.5 / (windows.spacing * windows.step_s),
         n_rows=len(solution.residual),

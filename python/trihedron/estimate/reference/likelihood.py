@@ -90,26 +90,32 @@ def equations(problem: Problem, strengths: FloatArray) -> Equations:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Posterior of all parameters under given strengths: mean (p,), covariance (p, p), log evidence."""
+    """Posterior of all parameters under given strengths: mean (p,), covariance (p, p), log evidence.
+
+    With every bias as its mean over time instead of its value at the start parameters are ``change`` (p, p) times these
+    plus ``shift`` (p,), with the covariance ``added`` (p, p) of the walks.
+    """
 
     mean: FloatArray
     covariance: FloatArray
     evidence: float
+    change: FloatArray
+    shift: FloatArray
+    added: FloatArray
 
 
 def together(problems: Sequence[Problem], strengths: FloatArray) -> Together:
     """Posterior of several recordings in one fit under ``strengths`` (recordings, 8); every prior counts once."""
-    return _solved(problems, _equations(problems, strengths))
-
-
-def _equations(problems: Sequence[Problem], strengths: FloatArray) -> list[Equations]:
-    return [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
-
-
-def _solved(problems: Sequence[Problem], found: Sequence[Equations]) -> Together:
+    found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
     L, half, evidence = _eliminated(problems, found)
     inverse = np.linalg.inv(L)
-    return Together(inverse.T @ half, inverse.T @ inverse, evidence)
+    change, shift, added = np.eye(len(L)), np.zeros(len(L)), np.zeros(L.shape)
+    for problem, one in zip(problems, found, strict=True):
+        b, sigma = problem.index[problem.bias], problem.sigma[problem.bias]
+        change[np.ix_(b, problem.index)] -= one.mean_bias[:, :-1] / sigma[:, None]
+        shift[b] = one.mean_bias[:, -1] / sigma
+        added[np.ix_(b, b)] = one.cov_mean_bias / np.outer(sigma, sigma)
+    return Together(inverse.T @ half, inverse.T @ inverse, evidence, change, shift, added)
 
 
 def _eliminated(problems: Sequence[Problem], found: Sequence[Equations]) -> tuple[FloatArray, FloatArray, float]:
@@ -126,13 +132,6 @@ def _eliminated(problems: Sequence[Problem], found: Sequence[Equations]) -> tupl
     half = np.linalg.solve(L, moment)
     evidence = constant - 0.5 * float(centre @ centre) + 0.5 * float(half @ half) - float(np.sum(np.log(np.diag(L))))
     return np.asarray(L), half, evidence
-
-
-def at_the_point(problems: Sequence[Problem], strengths: FloatArray) -> float:
-    """Log density of the readings and of all parameters at the point of linearisation."""
-    found = _equations(problems, strengths)
-    priors = {int(i): float(c) for p in problems for i, c in zip(p.index, p.centre, strict=True)}
-    return sum(one.constant for one in found) - 0.5 * sum(c * c for c in priors.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,9 +215,10 @@ def fit(problems: Sequence[Problem], start: FloatArray) -> Fitted:
     best, evidence = most_likely(problems, start)
     walks = [_walk(_heights(problems, best, k), best[k]) for k in range(len(problems))]
     draws = np.stack(walks, axis=1)
-    solved = [_with_mean_bias(problems, draw) for draw in draws]
-    means = np.array([mean for mean, _ in solved])
-    covariance = np.mean([cov for _, cov in solved], axis=0) + np.cov(means.T, bias=True)
+    solved = [together(problems, draw) for draw in draws]
+    means = np.array([one.change @ one.mean + one.shift for one in solved])
+    each = [one.change @ one.covariance @ one.change.T + one.added for one in solved]
+    covariance = np.mean(each, axis=0) + np.cov(means.T, bias=True)
     return Fitted(means.mean(axis=0), covariance, evidence, best, draws)
 
 
@@ -238,20 +238,6 @@ def _walk(height: Height, start: FloatArray) -> FloatArray:
             now, here = other, there
         seen.append(now)
     return np.array(seen[ADAPTED::THINNED])
-
-
-def _with_mean_bias(problems: Sequence[Problem], strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Posterior mean and covariance with every bias as its mean over time instead of its value at the start."""
-    found = _equations(problems, strengths)
-    all_of = _solved(problems, found)
-    change, shift = np.eye(len(all_of.mean)), np.zeros(len(all_of.mean))
-    added = np.zeros_like(all_of.covariance)
-    for problem, one in zip(problems, found, strict=True):
-        b, sigma = problem.index[problem.bias], problem.sigma[problem.bias]
-        change[np.ix_(b, problem.index)] -= one.mean_bias[:, :-1] / sigma[:, None]
-        shift[b] = one.mean_bias[:, -1] / sigma
-        added[np.ix_(b, b)] = one.cov_mean_bias / np.outer(sigma, sigma)
-    return change @ all_of.mean + shift, change @ all_of.covariance @ change.T + added
 
 
 def _covariance(height: Height, at: FloatArray) -> FloatArray:

@@ -4,44 +4,35 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import TINY, XYZ, FloatArray, rms_of, sigmas_of
+from trihedron.arrays import XYZ, FloatArray, sigmas_of
 from trihedron.errors import InputError
-from trihedron.estimate.reference.gyroscope import GyroFit
 from trihedron.estimate.reference.likelihood import Problem, most_likely, together
 from trihedron.estimate.reference.motion import MotionFit
+from trihedron.estimate.reference.start import Start
 from trihedron.records import Recording
 from trihedron.records.reference import NAMED_FROM, ReferenceMotion
 from trihedron.units import rate_to_si
 
 STRANGERS = 0.6
 """Residual share of the reference's rate above which there is no shared motion, whatever the correlation."""
-TURNING = 0.5
-"""Least rate of a row that rotates, relative to the rms rate: in a session of poses the rows of its moves."""
 
 
-def share_left(gyro: GyroFit) -> float:
-    """Median residual over the median reference rate, of rows that rotate; medians are robust to impacts."""
-    turns = gyro.size >= TURNING * rms_of(gyro.size)
-    left = np.linalg.norm(gyro.solution.residual, axis=1)[turns]
-    return float(np.median(left) / max(float(np.median(gyro.size[turns])), TINY))
-
-
-def reject_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
+def reject_strangers(start: Start, motion: ReferenceMotion) -> None:
     """Raise ``InputError`` where the rates agree in magnitude, but no mounting rotation makes them equal."""
-    left = share_left(gyro)
-    if left > STRANGERS and not motion.is_stepwise:
+    if start.share_left > STRANGERS and not motion.is_stepwise:
         raise InputError(
             f"{motion.source}: this reference and the log share no motion: their turning rates look alike in size, but "
-            f"no mounting makes them one ({100 * left:.0f} % of the rate is left); name the reference of this very log."
+            f"no mounting makes them one ({100 * start.share_left:.0f} % of the rate is left); name the reference of "
+            "this very log."
         )
 
 
-def reject_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -> None:
+def reject_units(recording: Recording, start: Start, motion: ReferenceMotion) -> None:
     """Raise ``InputError`` where the rates differ by a factor of units: 57.3, 1000, 60 or 9.55 (rpm)."""
     nominal = rate_to_si(recording.gyroscope_unit)
     if nominal is None:
         return
-    scale = float(np.exp(np.mean(np.log(np.linalg.svd(gyro.A, compute_uv=False))))) / nominal
+    scale = float(np.exp(np.mean(np.log(np.linalg.svd(start.S, compute_uv=False))))) / nominal
     for factor, words in (
         (np.degrees(1.0), "its angles or rates are in deg"),
         (np.radians(1.0), "its angles or rates are in rad"),

@@ -8,12 +8,11 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.reference.beside import Beside, Point, SlowError, places
+from trihedron.estimate.reference.beside import Beside, Point, SlowError, places, without_effects
 from trihedron.estimate.reference.likelihood import (
     TYPICAL,
     Fitted,
     Problem,
-    at_the_point,
     fit,
     most_likely,
     together,
@@ -35,8 +34,6 @@ SURPRISE = 1e-6
 """False alarm rate of a deviating block, divided by the number of blocks."""
 MOST_ROUNDS = 6
 """Rounds of excluding deviating blocks: a large deviation conceals smaller ones."""
-SHORTER = 0.5 ** np.arange(6)
-"""Factors on a step that are tried: a clock offset is linear only up to a quarter of a period of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,25 +85,15 @@ def fit_motion(
             lost = [_deviating(problem, s, mean) for problem, s in zip(problems, strengths, strict=True)]
         is_new = any(len(one) for one in lost) or not turn
         turn, rounds = (1, rounds + 1) if turn and is_new else (turn + 1, rounds)
-        # Log densities are compared about the same slow error: another one is another linear model.
         points = [
-            replace(point, lost_s=np.append(point.lost_s, one), slow=slow_error(side, problem, s, mean))
-            for side, point, problem, s, one in zip(sides, points, problems, strengths, lost, strict=True)
+            replace(
+                side.moved(point, {name: side.sigma(name, wider) * mean[at] for name, at in own.items()}),
+                lost_s=np.append(point.lost_s, one),
+                slow=slow_error(side, problem, s, mean),
+            )
+            for side, point, problem, own, s, one in zip(sides, points, problems, where, strengths, lost, strict=True)
         ]
         problems = _problems(sides, points, where, wider)
-        height = at_the_point(problems, strengths)
-        for shorter in SHORTER:
-            ahead = [
-                side.moved(point, {name: shorter * side.sigma(name, wider) * mean[at] for name, at in own.items()})
-                for side, point, own in zip(sides, points, where, strict=True)
-            ]
-            there = _problems(sides, ahead, where, wider)
-            if at_the_point(there, strengths) > height:
-                points, problems = ahead, there
-                break
-        else:
-            if not is_new:
-                break
     return MotionFit(sides, points, where, problems, fit(problems, strengths), wider)
 
 
@@ -198,11 +185,20 @@ def scores(found: MotionFit) -> list[Scored]:
 
 
 def _tuned(found: MotionFit, names: tuple[str, ...], wider: Mapping[str, float], start: FloatArray) -> MotionFit:
-    """Another hypothesis about the same point, effects at 0 there, under its own strengths, sought from ``start``."""
-    points = [replace(p, g=np.zeros((3, 3)), bend=np.zeros(6)) for p in found.points]
-    where = places(found.sides, names)
-    problems = _problems(found.sides, points, where, wider)
-    strengths, evidence = most_likely(problems, start, found.fitted.spread())
+    """Another hypothesis about the same points under its own strengths, sought from ``start``."""
+    points = [without_effects(point) for point in found.points]
+    problems = _problems(found.sides, points, places(found.sides, names), wider)
+    strengths, _ = most_likely(problems, start, found.fitted.spread())
+    return under(found.sides, points, names, strengths, wider)
+
+
+def under(
+    sides: list[Beside], points: list[Point], names: tuple[str, ...], strengths: FloatArray,
+    wider: Mapping[str, float] | None = None,
+) -> MotionFit:  # fmt: skip
+    """Fit of the named parameters about ``points``, under given strengths (recordings, 8)."""
+    where = places(sides, names)
+    problems = _problems(sides, points, where, wider or {})
     all_of = together(problems, strengths)
-    fitted = Fitted(all_of.mean, all_of.covariance, evidence, strengths, strengths[None])
-    return MotionFit(found.sides, points, where, problems, fitted, wider)
+    fitted = Fitted(all_of.mean, all_of.covariance, all_of.evidence, strengths, strengths[None])
+    return MotionFit(sides, points, where, problems, fitted, wider or {})

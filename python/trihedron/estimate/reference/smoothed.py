@@ -17,20 +17,14 @@ import numpy as np
 from scipy.linalg import matmul_toeplitz
 
 from trihedron.arrays import TINY, FloatArray, IntArray
-from trihedron.estimate.reference.accelerometer import ForceFit, turns, turns_of_frame
-from trihedron.estimate.reference.likelihood import (
-    FARTHEST,
-    SPREAD,
-    STRENGTHS,
-    TYPICAL,
-    Problem,
-    together,
-)
+from trihedron.estimate.reference.accelerometer import ForceFit
+from trihedron.estimate.reference.likelihood import STRENGTHS, Problem, together
 from trihedron.estimate.reference.motion import MotionFit, slow_error
 from trihedron.estimate.reference.together import Reference
 from trihedron.records.reference import BiasOverTime, ErrorOverTime
 
-BODY = STRENGTHS.index("body")
+GYRO = ("S", "b")
+"""Parameters of the gyro in a calibration."""
 
 
 def bias_over_time(found: MotionFit, k: int) -> BiasOverTime:
@@ -112,34 +106,12 @@ def without_slow_error(found: MotionFit, k: int) -> Reference:
     return Reference(replace(motion, attitude=np.ascontiguousarray(own)))
 
 
-def frame_covariance(found: MotionFit, k: int) -> FloatArray:
-    """Covariance (3, 3) [rad²] of the rotation between the body and the mean body frame of recording k's reference.
+def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Covariance (n, n) of the n elements of ``force``, fitted in windows about ``time_s`` of the log of recording k,
+    and (n, 12) with the gyro's S row by row and b.
 
-    The mean of a slow error in the body frame is equivalent to a mounting: no motion determines it, and it rotates both
-    sensors equally. It is the increase of the covariance of the rotation of S by that error.
-    """
-    side = found.sides[k]
-    if side.reference.motion.attitude is None:
-        return np.zeros((3, 3))
-    at = found.places[k]["S"]
-    sigma = side.sigma("S", found.wider)
-    # Pseudoinverse of the change of S by rotations of the body about each axis.
-    turn = np.linalg.pinv(turns(found.value(k, "S").reshape(3, 3))) * sigma
-    out = np.zeros((3, 3))
-    for strengths in found.fitted.draws:
-        without = strengths.copy()
-        without[:, BODY] = (TYPICAL - FARTHEST * SPREAD)[BODY]
-        both, alone = (together(found.problems, one).covariance[np.ix_(at, at)] for one in (strengths, without))
-        values, vectors = np.linalg.eigh(turn @ (both - alone) @ turn.T)
-        out += (vectors * np.maximum(values, 0.0)) @ vectors.T / len(found.fitted.draws)
-    return out
-
-
-def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray, frame: FloatArray) -> FloatArray:
-    """(n, n) covariance of the n elements of ``force``, fitted in windows about ``time_s`` of the log of recording k.
-
-    It is averaged over the posterior of the strengths. The common rotation of both sensors, with covariance ``frame``
-    (3, 3) [rad²], is included in full.
+    They are averaged over the posterior of the strengths. The mean of a slow error in the body frame is equivalent to a
+    mounting: no motion determines it, and it rotates both sensors alike.
     """
     side, problem, own, point = found.sides[k], found.problems[k], found.places[k], found.points[k]
     direct = np.zeros((len(force.wrt_clock), len(problem.index)))
@@ -151,30 +123,39 @@ def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray,
     if force.wrt_attitude is not None:
         C = without_slow_error(found, k).attitude(time_s * (1.0 + point.rate) + point.offset_s) @ point.mounting
         nodes = _on_nodes(problem, force.wrt_attitude, C, time_s)
-    wrong = [_under(found, k, strengths, direct, nodes) for strengths in (found.fitted.strengths, *found.fitted.draws)]
-    means = np.array([mean for mean, _ in wrong])
-    from_used = means[1:] - means[0]
-    covariance = np.mean([one for _, one in wrong[1:]], axis=0) + from_used.T @ from_used / len(from_used)
-    return _with_frame(covariance, force, frame)
+    used, *drawn = (
+        _under(found, k, strengths, direct, nodes) for strengths in (found.fitted.strengths, *found.fitted.draws)
+    )
+    means = np.array([mean for mean, _ in drawn])
+    joint = np.mean([one for _, one in drawn], axis=0) + np.cov(means.T, bias=True)
+    n = len(direct)
+    off = (means.mean(axis=0) - used[0])[:n]
+    of_gyro = np.concatenate([side.sigma(name, found.wider) for name in GYRO])
+    return joint[:n, :n] + np.outer(off, off), joint[:n, n:] * of_gyro
 
 
 def _under(
     found: MotionFit, k: int, strengths: FloatArray, direct: FloatArray, nodes: tuple[FloatArray, FloatArray] | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (n,), up to a constant common to all ``strengths`` (a recording, 8), and covariance (n, n) of the errors of
-    (1); L is ``direct`` (n, p), ``nodes`` holds H of the world and of the body error, (m, 3, n) each."""
+    """Mean (n + 12,), up to a constant common to all ``strengths`` (a recording, 8), and covariance of the errors of
+    (1) and of the gyro's S and b; L is ``direct`` (n, p), ``nodes`` holds H of the world and of the body error,
+    (m, 3, n) each."""
     problem = found.problems[k]
     all_of = together(found.problems, strengths)
-    mean, cov = all_of.mean[problem.index], all_of.covariance[np.ix_(problem.index, problem.index)]
-    if nodes is None:
-        return direct @ mean, direct @ cov @ direct.T
-    joint, prior = _prior(problem, nodes, np.exp(strengths[k]))
-    table = np.ascontiguousarray(np.column_stack([problem.table, joint]))
-    gram = problem.blocks.normal(table, np.exp(strengths[k]).tolist()).gram
-    p = len(problem.index)
-    by_slow, told = gram[p + 1 :, : p + 1], gram[p + 1 :, p + 1 :]
-    linear = direct - by_slow[:, :-1]
-    return linear @ mean + by_slow[:, -1], linear @ cov @ linear.T + _positive(prior - told)
+    gyro = np.concatenate([found.places[k][name] for name in GYRO])
+    n, p = direct.shape
+    linear = np.vstack([np.zeros((n, len(all_of.mean))), all_of.change[gyro]])
+    linear[:n, problem.index] = direct
+    alone, shift = np.zeros((n + 12, n + 12)), np.append(np.zeros(n), all_of.shift[gyro])
+    alone[n:, n:] = all_of.added[np.ix_(gyro, gyro)]
+    if nodes is not None:
+        joint, prior = _prior(problem, nodes, np.exp(strengths[k]))
+        table = np.ascontiguousarray(np.column_stack([problem.table, joint]))
+        gram = problem.blocks.normal(table, np.exp(strengths[k]).tolist()).gram
+        linear[:n, problem.index] -= gram[p + 1 :, :p]
+        shift[:n] = gram[p + 1 :, p]
+        alone[:n, :n] = _positive(prior - gram[p + 1 :, p + 1 :])
+    return linear @ all_of.mean + shift, linear @ all_of.covariance @ linear.T + alone
 
 
 def _prior(
@@ -210,16 +191,6 @@ def _on_nodes(
         np.add.at(out, before, (1.0 - after) * each)
         np.add.at(out, np.minimum(before + 1, m - 1), after * each)
     return world, body
-
-
-def _with_frame(covariance: FloatArray, force: ForceFit, frame: FloatArray) -> FloatArray:
-    """The covariance with at least the contribution of ``frame``, for a positive joint covariance of both sensors."""
-    J = np.zeros((len(covariance), 3))
-    J[:12] = turns_of_frame(force.S, force.b)
-    if force.arm is not None:
-        J[-3:] = turns(force.arm[:, None])
-    common = J @ frame @ J.T
-    return common + _positive(covariance - common)
 
 
 def _positive(covariance: FloatArray) -> FloatArray:

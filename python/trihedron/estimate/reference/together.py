@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from trihedron._core import rolling_mean
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.quantiles import MAD_TO_SIGMA
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
@@ -67,8 +68,11 @@ class Reference:
         t = motion.time_s
         self.step_s = float(np.median(np.diff(t)))
         self._attitude: CubicSpline | None = None
-        if motion.attitude is not None:
-            q = Rotation.from_matrix(motion.attitude).as_quat()
+        attitude = motion.attitude
+        if attitude is None and motion.rate is not None and not motion.is_stepwise:
+            attitude = integrate_rate(t, motion.rate)
+        if attitude is not None:
+            q = Rotation.from_matrix(attitude).as_quat()
             flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
             q[1:] *= flips[:, None]
             self._attitude = CubicSpline(t, q)
@@ -83,7 +87,7 @@ class Reference:
         return within(self.motion.time_s, time, self.step_s)
 
     def attitude(self, time: FloatArray) -> FloatArray:
-        """(n, 3, 3) body → world."""
+        """(n, 3, 3) body → world; of rates from an attitude of its own at the first row."""
         assert self._attitude is not None
         return np.asarray(Rotation.from_quat(self._attitude(self._clip(time))).as_matrix())
 
@@ -199,3 +203,17 @@ def windows_on(is_valid: BoolArray, step_s: float, spacing: int) -> Windows:
     return Windows(
         m, step_s, h * step_s / spacing_s, slope * step_s / spacing_s**2, curvature * step_s / spacing_s**3, start
     )
+
+
+MOST_WINDOWS = 20_000
+"""Most windows; a longer log has longer windows: 0.18 s for an hour, still short for motion by hand."""
+FINEST = 4
+"""Fewest samples between windows: a cubic B-spline over 16 samples has a summation error of 1e-6."""
+
+
+def windows_beside(grid: Grid, reference: Reference, seen: BoolArray, least_s: float = 0.0) -> Windows:
+    """Windows where both are ``seen`` (n,), at least ``least_s`` apart, and two rows of the reference."""
+    spacing = max(FINEST, round(least_s / grid.step_s), int(np.ceil(len(grid.time_s) / MOST_WINDOWS)))
+    if not reference.motion.is_stepwise:
+        spacing = max(spacing, int(np.ceil(2.0 * reference.step_s / grid.step_s)))
+    return windows_on(seen, grid.step_s, spacing)

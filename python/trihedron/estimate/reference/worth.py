@@ -8,6 +8,7 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.likelihood import STRENGTHS
 from trihedron.estimate.reference.motion import MotionFit
+from trihedron.estimate.reference.residuals import fine_s, rate_left
 from trihedron.estimate.reference.slip import Slip
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import chdtri
@@ -17,8 +18,6 @@ from trihedron.records.reference import AgainstReference, Estimate, ReferenceErr
 from trihedron.sensor_model import reframing
 
 WHITE, WORLD, BODY = (STRENGTHS.index(one) for one in ("white", "world", "body"))
-FINE_S = 0.1
-"""Block length [s] whose differences show noise from some 0.1 to 5 Hz."""
 SQUARE = np.radians(0.01)
 """No mounting is accurate to 0.01°: a smaller angle means that the reference's body frame is the gyro's."""
 QUIET_PARTS = 50
@@ -76,12 +75,10 @@ def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ..
 
 def residual_density(side: Beside, found: MotionFit, k: int) -> float:
     """White density [rad/s/√Hz] of the difference between gyro and reference from some 0.1 to 5 Hz."""
-    fine = side.problem(found.points[k], found.places[k], found.wider, FINE_S)
-    rows = fine.blocks.rows()[:, 0] > 0
-    change = np.diff(fine.observed.reshape(-1, 3), axis=0)[rows[1:] & rows[:-1]]
+    _, rate = rate_left(side, found.points[k])
     # Means of a random walk over neighbouring blocks differ by 2/3 of its variance per block; the median is robust
     # to impacts and divided by that of chi-square with 3 degrees of freedom.
-    return float(np.sqrt(np.median(np.sum(change**2, axis=1)) / (2.0 / 3.0 * FINE_S * chdtri(3.0, 0.5))))
+    return float(np.sqrt(np.median(np.sum(rate**2, axis=1)) * fine_s(side) / (2.0 / 3.0 * chdtri(3.0, 0.5))))
 
 
 def noise_at_rest(side: Beside, found: MotionFit, k: int) -> float:
