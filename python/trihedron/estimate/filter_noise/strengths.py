@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
-from scipy.special import logsumexp, ndtr, ndtri
+from scipy.special import ndtr, ndtri
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.filter_noise.stretch import NAMES, WEIGHTS, Stretch
+from trihedron.estimate.importance import LEAST_DRAWS, drawn_from
 from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.estimate.reference.likelihood import FARTHEST
 from trihedron.probability import NORMAL_95
@@ -26,13 +27,9 @@ STEP = 1e-3
 """Step in a coordinate for derivatives of the covariance."""
 SEARCHES, LONGEST_STEP, ENOUGH = 80, 2.0, 0.01
 """Most steps of the search, longest step in a coordinate, and gain of the log posterior below which it ends."""
-ROUNDS, MOST_ROUNDS, PROPOSED, DRAWN = 3, 15, 100, 400
-"""Fewest and most rounds of proposals, proposals per round, and number of draws returned."""
-LEAST_DRAWS, ENOUGH_DRAWS = 3, 40
-"""Effective draws per strength: below the first their covariance is too narrow, or singular, for proposals; above the
-second sampling may end: of 280 draws the ends of a 95 % interval are sound, of 100 they are too close together."""
-TAILS = 5
-"""Degrees of freedom of a proposal: heavier tails than the posterior's."""
+DRAWN, ENOUGH_DRAWS = 400, 40
+"""Number of draws returned; effective ones per strength above which sampling may end: of 280 draws the ends of a 95 %
+interval are sound, of 100 they are too close together."""
 TIMES_S = (10.0, 30.0, 100.0)
 """Correlation times of a Gauss-Markov bias that are compared with the random walk."""
 PREFERRED = 6.0
@@ -176,8 +173,7 @@ def with_slow_error_of(prior: Prior, draws: FloatArray) -> Prior:
 
 
 def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:
-    """Posterior of the strengths by adaptive importance sampling (Cornuet et al. 2012): each round proposes from
-    Student's distribution with the moments of all earlier draws; weights are against the mixture of all rounds.
+    """Posterior of the strengths by adaptive importance sampling.
 
     Proposals are in coordinates u whose strength is proportional to sinh u where it may be nothing: its density is flat
     at 0, where the logarithm has a long tail that proposals of the right moments miss.
@@ -196,41 +192,10 @@ def fit(stretches: Sequence[Stretch], prior: Prior) -> Fitted:
             return -np.inf
         return height(stretches, prior, coordinates(u)) - float(np.sum(np.log(np.tanh(u[from_zero]))))
 
-    rng = np.random.default_rng(0)
-    middle, spread, proposals = np.where(from_zero, 1.0, mode), first, []
-    u, heights = np.empty((0, len(middle))), np.empty(0)
-    for drawn in range(1, MOST_ROUNDS + 1):
-        root = np.linalg.cholesky(spread)
-        proposals.append((middle, root))
-        widths = np.sqrt(TAILS / rng.chisquare(TAILS, size=(PROPOSED, 1)))
-        new = middle + widths * rng.normal(size=(PROPOSED, len(middle))) @ root.T
-        u = np.vstack([u, new])
-        heights = np.append(heights, [log_density(one) for one in new])
-        logs = heights - _mixture(u, proposals)
-        weights = np.exp(logs - logs.max())
-        weights /= weights.sum()
-        if drawn >= ROUNDS and _effective(weights) > ENOUGH_DRAWS * len(middle):
-            break
-        # Too few effective draws make the next proposal too narrow: the weights are flattened until there are enough.
-        flat = weights if _effective(weights) > LEAST_DRAWS * len(middle) else np.sqrt(weights) / np.sqrt(weights).sum()
-        middle = flat @ u
-        spread = ((u - middle).T * flat) @ (u - middle) + 0.02 * first
-    evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
-    chosen = np.searchsorted(np.cumsum(weights), (np.arange(DRAWN) + 0.5) / DRAWN).clip(max=len(u) - 1)
-    draws = np.array([whole(prior, coordinates(one)) for one in u[chosen]])
-    return Fitted(whole(prior, coordinates(u[np.argmax(heights)])), evidence, draws, _effective(weights))
-
-
-def _effective(weights: FloatArray) -> float:
-    return float(1.0 / np.sum(weights**2))
-
-
-def _mixture(x: FloatArray, proposals: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """(k,) log density of points (k, f) under the equal mixture of Student's distributions (mean, Cholesky root)."""
-    from scipy.stats import multivariate_t  # imported here: the import takes longer than the rest of the command
-
-    each = [multivariate_t(middle, root @ root.T, TAILS).logpdf(x) for middle, root in proposals]
-    return np.asarray(logsumexp(each, axis=0) - np.log(len(proposals)))
+    drawn = drawn_from(log_density, np.where(from_zero, 1.0, mode), first, ENOUGH_DRAWS * len(mode))
+    draws = np.array([whole(prior, coordinates(one)) for one in drawn.chosen(DRAWN)])
+    best = whole(prior, coordinates(drawn.points[np.argmax(drawn.heights)]))
+    return Fitted(best, drawn.evidence, draws, drawn.n_effective)
 
 
 def bounded(values: Sequence[float] | FloatArray) -> Bounded:

@@ -15,6 +15,7 @@ from scipy.optimize import minimize
 
 from trihedron._core import ReferenceBlocks
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.estimate.importance import drawn_from
 from trihedron.threads import side_by_side
 
 Height = Callable[[FloatArray], float]
@@ -37,11 +38,11 @@ STARTS = 3
 STEP = 1e-4
 CURVATURE_STEP = 0.25
 """Steps in the logarithm of a strength for the gradient (the curvature reaches the number of rows: a hundred times as
-long a step ended searches ten units of log evidence too early), and for the curvature at the start of the walk."""
+long a step ended searches ten units of log evidence too early), and for the curvature with which sampling begins."""
 MOST_TURNS, FIRST_TURNS = 60, 15
 """Turns of a search; turns after which only the best of several searches goes on."""
-STEPS, ADAPTED, THINNED = 600, 150, 12
-"""Steps of the Metropolis walk; steps between adaptations of its proposal, and burn-in; thinning."""
+DRAWN, ENOUGH_DRAWS = 40, 10
+"""Draws of the strengths that parameters are averaged over; effective ones per strength that end the sampling."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ class Fitted:
 
     def spread(self) -> FloatArray:
         """Cholesky roots (recordings, 8, 8) of the covariance of the strengths' logarithms."""
-        # With few accepted steps the draws' covariance is singular.
+        # With few different draws their covariance is singular.
         least = np.diag((LEAST_SPREAD * SPREAD) ** 2)
         return np.array([np.linalg.cholesky(np.cov(one.T) + least) for one in self.draws.swapaxes(0, 1)])
 
@@ -211,10 +212,9 @@ def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Heig
 
 
 def fit(problems: Sequence[Problem], start: FloatArray) -> Fitted:
-    """Mode of the strengths, a Metropolis walk over their posterior per recording, and parameters averaged over it."""
+    """Mode of the strengths, draws of their posterior per recording, and parameters averaged over these."""
     best, evidence = most_likely(problems, start)
-    walks = [_walk(_heights(problems, best, k), best[k]) for k in range(len(problems))]
-    draws = np.stack(walks, axis=1)
+    draws = np.stack([_drawn(_heights(problems, best, k), best[k]) for k in range(len(problems))], axis=1)
     solved = [together(problems, draw) for draw in draws]
     means = np.array([one.change @ one.mean + one.shift for one in solved])
     each = [one.change @ one.covariance @ one.change.T + one.added for one in solved]
@@ -222,38 +222,13 @@ def fit(problems: Sequence[Problem], start: FloatArray) -> Fitted:
     return Fitted(means.mean(axis=0), covariance, evidence, best, draws)
 
 
-def _walk(height: Height, start: FloatArray) -> FloatArray:
-    """(k, 8) draws by an adaptive Metropolis walk (Haario): proposals from the curvature first, then from the draws."""
-    n, covariance = len(start), _covariance(height, start)
-    rng = np.random.default_rng(0)
-    now, here = start, height(start)
-    seen: list[FloatArray] = []
-    root = np.linalg.cholesky(covariance)
-    for k in range(STEPS):
-        if k and k % ADAPTED == 0:
-            root = np.linalg.cholesky(0.9 * np.cov(np.array(seen[-ADAPTED:]).T) + 0.1 * covariance)
-        other = now + 2.4 / np.sqrt(n) * root @ rng.normal(size=n)
-        there = -np.inf if np.any(np.abs(other - TYPICAL) > FARTHEST * SPREAD) else height(other)
-        if np.log(rng.uniform()) < there - here:
-            now, here = other, there
-        seen.append(now)
-    return np.array(seen[ADAPTED::THINNED])
+def _drawn(height: Height, best: FloatArray) -> FloatArray:
+    """(k, 8) draws of the strengths of one recording, whose posterior has its maximum at ``best`` (8,)."""
 
+    def inside(x: FloatArray) -> float:
+        return -np.inf if np.any(np.abs(x - TYPICAL) > FARTHEST * SPREAD) else height(x)
 
-def _covariance(height: Height, at: FloatArray) -> FloatArray:
-    """(8, 8) inverse of the curvature of ``height``, at most the prior's variance."""
-    values, vectors = np.linalg.eigh(_curvature(height, at))
-    return np.asarray((vectors / np.maximum(values, 1.0 / SPREAD.max() ** 2)) @ vectors.T)
-
-
-def _curvature(function: Height, at: FloatArray) -> FloatArray:
-    """Negative Hessian (n, n) of a function of (n,), by finite differences."""
-    n, h = len(at), CURVATURE_STEP * np.eye(len(at))
-    here = function(at)
-    ahead = [function(at + h[i]) for i in range(n)]
-    out = np.empty((n, n))
-    for i in range(n):
-        out[i, i] = ahead[i] + function(at - h[i]) - 2.0 * here
-        for j in range(i):
-            out[i, j] = out[j, i] = function(at + h[i] + h[j]) - ahead[i] - ahead[j] + here
-    return -out / CURVATURE_STEP**2
+    beside = best + CURVATURE_STEP * np.concatenate([np.eye(len(best)), -np.eye(len(best))])
+    curved = 2.0 * height(best) - np.sum(np.reshape(side_by_side(height, beside), (2, -1)), axis=0)
+    variance = 1.0 / np.maximum(curved / CURVATURE_STEP**2, 1.0 / SPREAD**2)
+    return drawn_from(inside, best, np.diag(variance), ENOUGH_DRAWS * len(best)).chosen(DRAWN)
