@@ -125,6 +125,16 @@ def test_a_truth_that_wanders_in_the_body_leaves_the_accelerometer_within_its_un
     assert np.abs(off.ravel() / sigma).max() < 4.5  # 9 with the truth's attitudes as they are
     # A turn of all axes is not known to half a degree, and scales are to some 1e-4.
     assert np.degrees(np.linalg.norm(found.mounting.std)) > 0.3
+    # That turn is common to both: of their joint covariance every combination has a positive variance.
+    joint = np.block(
+        [
+            [found.accelerometer.covariance, found.cross_covariance],
+            [found.cross_covariance.T, found.gyroscope.covariance],
+        ]
+    )
+    scale = np.sqrt(np.diag(joint))
+    assert np.linalg.eigvalsh(joint / np.outer(scale, scale)).min() > -1e-9  # rounding
+    assert np.abs(found.cross_covariance / np.outer(scale[:12], scale[12:])).max() > 0.5
     assert np.abs(np.diag(off @ trial.unit.N)).max() < 1e-3
 
 

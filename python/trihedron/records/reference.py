@@ -172,19 +172,14 @@ class BiasOverTime(Plain):
 
 @dataclass(frozen=True, eq=False)
 class ErrorOverTime(Plain):
-    """Attitude of the reference relative to the calibrated gyro's over the log's time (m,): vectors (m, 3) [rad].
-
-    Along the axes of the reference's world, about their mean in each stretch (between gaps of the log and deviating
-    intervals); NaN where the reference has no rows. It is the reference's error plus the gyro's angle random walk since
-    the beginning of the stretch, ``walk`` [rad/√s].
-    """
+    """Smoothed slow error of the reference's attitude over the log's time (m,): rotation vectors (m, 3) [rad] along the
+    axes of the reference's world; NaN where the reference has no rows."""
 
     time_s: FloatArray
     angle: FloatArray
-    walk: float
 
 
-NOWHERE = ErrorOverTime(np.zeros(0), np.zeros((0, 3)), 0.0)
+NOWHERE = ErrorOverTime(np.zeros(0), np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from trihedron.arrays import AXES, TINY, XYZ, sigmas_of
+from trihedron.arrays import AXES, XYZ, sigmas_of
 from trihedron.records import Calibration
 from trihedron.records.published import HELD_OUT
 from trihedron.records.reference import NAMED_FROM, AgainstReference, Estimate, FitToReference, ReferenceError
@@ -247,15 +247,12 @@ def _shown_from(ident: str, one: Estimate) -> str:
 
 
 def error_picture(found: AgainstReference, name: str = "reference-error") -> Picture | None:
-    """The reference's error over time; ``None`` where no attitude was integrated for comparison."""
+    """The reference's error over time; ``None`` where it has no rows."""
     if not np.isfinite(found.apart.angle).any():
         return None
-    walk = plain_number(degrees_from_radians(found.apart.walk), 2)
-    caption = "Attitude of the reference against the calibrated gyro's, about their mean, along the axes of the "
-    caption += f"reference's world: the reference's error, and the gyro's random walk of {walk}°/√s. Band: ± 2 σ of "
-    caption += "both, about their mean."
+    caption = "Slow error of the reference's attitude along the axes of its world, smoothed. Band: its ± 2 σ."
     if found.error.apart_s:
-        caption += " Orange: where it differs from the other windows; the mean is new after it."
+        caption += " Orange: where it differs from the other windows."
     caption += " Grey: gaps." if found.error.gaps_s else ""
     return Picture(name, caption, partial(error_chart, found))
 
@@ -264,17 +261,11 @@ def error_chart(found: AgainstReference) -> Chart:
     """Three angles over the log's time, with the size of the slow error, gaps, and outlying intervals."""
     apart, error = found.apart, found.error
     ends = np.array([apart.time_s[0], apart.time_s[-1]])
-    marks: list[Mark] = [Level(y=0.0)]
-    edges = [ends[0], *(edge for interval in error.apart_s for edge in interval), ends[1]]
-    for k, (first, last) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-        # Variance of a random walk of length T about its mean, at the time t.
-        t, T = np.linspace(0.0, max(last - first, 0.0), 50), max(last - first, TINY)
-        variance = error.slow_rad[0] ** 2 + apart.walk**2 * (T / 3.0 - t + t**2 / T)
-        reach = TWO_SIGMA * DEGREES * np.sqrt(variance)
-        marks.append(Band(first + t, -reach, reach, "" if k else "2 σ of its slow error and the gyro's walk"))
+    reach = np.full(2, TWO_SIGMA * DEGREES * error.slow_rad[0])
+    marks: list[Mark] = [Level(y=0.0), Band(ends, -reach, reach, "2 σ of its slow error")]
     marks += [Span(first, last, "gap", "grey") for first, last in error.gaps_s]
     marks += [Span(first, last, "differs from the others", "warn") for first, last in error.apart_s]
     for k, colour in enumerate(AXIS_COLOURS):
         marks.append(Line(apart.time_s, DEGREES * apart.angle[:, k], XYZ[k], colour))
     x = Scale("time [s]", "s", limits=(float(ends[0]), float(ends[1])))
-    return Chart((Panel(x, Scale("reference − gyro [°]", "°"), tuple(marks), height_px=240),))
+    return Chart((Panel(x, Scale("error of the reference [°]", "°"), tuple(marks), height_px=240),))

@@ -30,9 +30,9 @@ class ForceFit:
     ``up`` is the unit vector of the static specific force in the reference's world, ``arm`` [m] leads from the
     reference's origin to the accelerometer, in the reference's body.
 
-    The ``covariance`` (n, n) assumes exact attitudes and clock. ``wrt_attitude`` (n, k, 3) [1/rad] and ``wrt_clock``
-    (n, k) [1/s] are the errors of the values per attitude error about a world axis (``None``: the fit uses no
-    attitude) and per clock error in each of k windows.
+    The ``covariance`` (n, n) assumes exact attitudes and clock. ``wrt_attitude``, twice (n, k, 3) [1/rad], and
+    ``wrt_clock`` (n, k) [1/s] are the errors of the values per attitude error about the axes of the world and of the
+    body (``None``: the fit uses no attitude) and per clock error in each of k windows.
     """
 
     values: FloatArray
@@ -40,7 +40,7 @@ class ForceFit:
     has_up: bool
     has_arm: bool
     solution: Solution
-    wrt_attitude: FloatArray | None
+    wrt_attitude: tuple[FloatArray, FloatArray] | None
     wrt_clock: FloatArray
 
     @property
@@ -151,10 +151,16 @@ def _along_path(
         base, path = rows(at)
         return path - base @ own
 
-    turned = np.einsum("nij,nj->ni", reference.attitude(time), averaged @ own[:9].reshape(3, 3).T)
+    C, S = reference.attitude(time), own[:9].reshape(3, 3)
+    turned = np.einsum("nij,nj->ni", C, averaged @ S.T)
     by_average = np.einsum("nka,ka->n", influence, windows.of(windows.weight, turned)) / np.sqrt(12.0)
-    # An attitude error -ε changes the prediction (C S a' + ...) by -ε x itself.
-    wrt_attitude = np.einsum("nka,kab->nkb", influence, cross_matrix(base @ own)) if has_up else None
+    wrt_attitude = None
+    if has_up:
+        # An attitude error -ε of the world changes the prediction (C S a' + ...) by -ε x itself; one of the body turns
+        # force and lever arm before they are differentiated.
+        force = C @ cross_matrix(signals[:, :3] @ S.T + own[9:12])
+        by_body = windows.of(windows.weight, force) + base[:, :, 12:15] @ cross_matrix(own[None, 12:])
+        wrt_attitude = _wrt_attitude(influence, cross_matrix(base @ own), by_body)
     return ForceFit(
         np.concatenate([own[:12], up if has_up else np.zeros(0), own[12:]]),
         J @ solution.covariance @ J.T + np.outer(by_average, by_average),
@@ -169,6 +175,12 @@ def _averaged(readings: FloatArray) -> FloatArray:
     """
     padded = np.pad(readings, ((1, 1), (0, 0)), mode="edge")
     return np.asarray((padded[2:] - 2.0 * readings + padded[:-2]) / 24.0)
+
+
+def _wrt_attitude(influence: FloatArray, world: FloatArray, body: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Errors (n, k, 3) of the parameters per attitude error, from their ``influence`` (n, k, 3) and the derivatives
+    (k, 3, 3) of the rows by errors of world and body."""
+    return np.einsum("nka,kab->nkb", influence, world), np.einsum("nka,kab->nkb", influence, body)
 
 
 def _wrt_clock(influence: FloatArray, left: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:
@@ -233,7 +245,8 @@ def _under_gravity(
 
     return ForceFit(
         np.concatenate([S.ravel(), b, up]), J @ solution.covariance @ J.T, True, False, in_si,
-        -np.einsum("nka,kab->nkb", influence, M @ back @ cross_matrix(up[None])), _wrt_clock(influence, left, time),
+        _wrt_attitude(influence, -M @ back @ cross_matrix(up[None]), -M @ cross_matrix(back @ up)),
+        _wrt_clock(influence, left, time),
     )  # fmt: skip
 
 

@@ -20,18 +20,8 @@ OUTLIER = 7.0
 """Residuals beyond 7 robust sigmas, and their neighbours, are excluded: p = 1/4e11 for a normal residual."""
 BLOCKS = 16
 """Blocks of time of the jackknife. With 16 the pooled variance ratio of 12 parameters scatters by 10 %."""
-MOST_STRETCHES = 100
-"""Most stretches that are taken for plateaus of a table; more are gaps of a bad log."""
 MOST_OUT = 0.2
 """Largest share of outliers: with more the robust sigma is wrong, and none is excluded."""
-
-
-@dataclass(frozen=True)
-class NoiseModel:
-    """Whether the noise grows with the motion, and the order of its autoregression."""
-
-    grows: bool
-    order: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +38,6 @@ class Solution:
     is_used: BoolArray
     widened: float
     rms_held_out: float
-    model: NoiseModel
 
 
 def solve(design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray) -> Solution:
@@ -63,23 +52,18 @@ def solve(design: FloatArray, target: FloatArray, index: IntArray, size: FloatAr
     scale = np.sqrt(np.mean(design**2, axis=(0, 1)))
     scale[scale == 0.0] = 1.0
     X = design / scale
-    best: tuple[float, Solution] | None = None
-    for one in (NoiseModel(grows, order) for grows in (False, True) for order in ORDERS):
-        if one.order * ROWS_PER_POLE > k:
-            continue
-        spread, solution = _solve(X, target, index, size, one)
-        if best is None or spread < best[0]:
-            best = spread, solution
-    assert best is not None
-    found = best[1]
+    orders = [order for order in ORDERS if order * ROWS_PER_POLE <= k]
+    tried = [_solve(X, target, index, motion, order) for motion in (None, size) for order in orders]
+    found = min(tried, key=lambda one: one[0])[1]
     theta, covariance = found.theta / scale, found.covariance / np.outer(scale, scale)
     return replace(found, theta=theta, covariance=covariance, influence=found.influence / scale[:, None, None])
 
 
 def _solve(
-    X: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel
+    X: FloatArray, target: FloatArray, index: IntArray, size: FloatArray | None, order: int
 ) -> tuple[float, Solution]:
-    """The solution under one noise model, and its scatter between blocks (mean log variance)."""
+    """Scatter between blocks (mean log variance) and the solution under noise that grows with the motion ``size`` (k,),
+    if given, and its autoregression of an ``order``."""
     k, _, p = X.shape
     used = np.ones(k, dtype=bool)
     weight = np.ones(k)
@@ -87,23 +71,24 @@ def _solve(
     theta = _least_squares(flat, target.ravel())
     for _ in range(2):
         r = target - X @ theta
-        weight = _weights(r, size, used) if model.grows else np.ones(k)
+        weight = np.ones(k) if size is None else _weights(r, size, used)
         length = np.linalg.norm(r * weight[:, None], axis=1)
         used = without_outliers(length)
         rows = np.repeat(used, 3)
         w = np.repeat(weight, 3)[rows]
         theta = _least_squares(flat[rows] * w[:, None], target.ravel()[rows] * w)
-    for _ in range(2 if model.order else 1):
+    for _ in range(2 if order else 1):
         r = (target - X @ theta) * weight[:, None]
-        filters = [_autoregression(r[:, axis], index, used, model.order) for axis in range(3)]
+        filters = [_autoregression(r[:, axis], index, used, order) for axis in range(3)]
         white, at = _whitening(index, used, filters)
         white = white * np.repeat(weight, 3)
         Z, y = white @ flat, white @ target.ravel()
         theta = _least_squares(Z, y)
     left = y - Z @ theta
-    variance = float(left @ left) / max(len(left) - p - 3 * model.order, 1)
+    variance = float(left @ left) / max(len(left) - p - 3 * order, 1)
     inverse = np.linalg.pinv(Z.T @ Z, hermitian=True)
-    jackknife, held_out = _by_blocks(X, target, index, used, Z, y, at, theta)
+    residual = target - X @ theta
+    jackknife, held_out = _by_blocks(X, residual, used, Z, left, at)
     predicted = variance * np.diag(inverse)
     is_known = (predicted > 0.0) & (jackknife > 0.0)
     # Mean of the parameter's own ratio and the median over all: sixteen blocks determine a variance to a third.
@@ -114,7 +99,7 @@ def _solve(
     spread = float(np.mean(np.log(np.maximum(jackknife, predicted)[is_known]))) if np.any(is_known) else np.inf
     covariance = variance * inverse * np.outer(wide, wide)
     influence = (white.T @ (Z @ inverse)).T.reshape(p, k, 3)
-    return spread, Solution(theta, covariance, influence, target - X @ theta, used, widened, held_out, model)
+    return spread, Solution(theta, covariance, influence, residual, used, widened, held_out)
 
 
 def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
@@ -181,38 +166,24 @@ def _whitening(index: IntArray, used: BoolArray, filters: list[FloatArray]) -> t
     return csr_array(of, shape=(len(first) - 1, 3 * len(index))), np.concatenate(rows_of)
 
 
-def _blocks(index: IntArray) -> IntArray:
-    """(k,) block number of each row: stretches between gaps (a table's plateaus), or equal parts."""
-    k = len(index)
-    stretch = np.concatenate([[0], np.cumsum(np.diff(index) > 1)])
-    if BLOCKS // 2 <= stretch[-1] < MOST_STRETCHES:
-        return np.asarray(stretch, dtype=np.int64)
-    return np.minimum(np.arange(k) * BLOCKS // k, BLOCKS - 1)
-
-
 def _by_blocks(
-    X: FloatArray, target: FloatArray, index: IntArray, used: BoolArray, Z: FloatArray, y: FloatArray, rows: IntArray,
-    theta: FloatArray,
-) -> tuple[FloatArray, float]:  # fmt: skip
-    """Jackknife variances (p,) over blocks of time, and unweighted rms of the held-out rows."""
-    block = _blocks(index)
-    normal, moment = Z.T @ Z, Z.T @ y
+    X: FloatArray, residual: FloatArray, used: BoolArray, Z: FloatArray, left: FloatArray, rows: IntArray
+) -> tuple[FloatArray, float]:
+    """Jackknife variances (p,) over blocks of time, and unweighted rms of the held-out rows, from the ``residual``
+    (k, 3) of all and ``left`` of the whitened rows ``Z``, which are those of the windows ``rows``."""
+    block = np.arange(len(X)) * BLOCKS // len(X)
+    normal = Z.T @ Z
     moved, error, n = [], 0.0, 0
-    for one in range(int(block[-1]) + 1):
+    for one in range(BLOCKS):
         out = block[rows] == one
-        if not np.any(out):
-            continue
         without = normal - Z[out].T @ Z[out]
-        if np.linalg.cond(without) > 1e12:
+        if not np.any(out) or np.linalg.cond(without) > 1e12:
             continue
-        other = np.linalg.solve(without, moment - Z[out].T @ y[out])
-        moved.append(other - theta)
+        moved.append(-np.linalg.solve(without, Z[out].T @ left[out]))
         seen = used & (block == one)
-        error += float(np.sum((target[seen] - X[seen] @ other) ** 2))
+        error += float(np.sum((residual[seen] - X[seen] @ moved[-1]) ** 2))
         n += 3 * int(seen.sum())
     if len(moved) < 4:
         return np.zeros(X.shape[2]), float("nan")
-    d = np.array(moved)
-    d -= d.mean(axis=0)
-    m = len(d)
-    return np.asarray((m - 1) / m * np.sum(d**2, axis=0)), float(np.sqrt(error / max(n, 1)))
+    m = len(moved)
+    return np.asarray((m - 1) * np.var(moved, axis=0)), float(np.sqrt(error / max(n, 1)))

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize
 
-from trihedron._core import ReferenceBlocks
+from trihedron._core import ReferenceBlocks, ReferenceNormal
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.importance import drawn_from
 from trihedron.threads import side_by_side
@@ -67,26 +67,16 @@ class Problem:
         return np.ascontiguousarray(np.column_stack([self.columns, self.observed]))
 
 
-@dataclass(frozen=True, eq=False)
-class Equations:
-    """Normal equations under strengths: information (p, p), moment (p,), and the constant of the log evidence.
-
-    ``mean_bias`` (3, p + 1), by columns, is the mean over time of the bias walk, ``cov_mean_bias`` its covariance.
-    """
-
-    information: FloatArray
-    moment: FloatArray
-    constant: float
-    mean_bias: FloatArray
-    cov_mean_bias: FloatArray
+Equations = tuple[ReferenceNormal, float]
+"""Normal equations under strengths, observations last, and the constant of the log evidence."""
 
 
 def equations(problem: Problem, strengths: FloatArray) -> Equations:
     """Normal equations of a recording under ``strengths`` (8,), logarithms in the order of :data:`STRENGTHS`."""
     found = problem.blocks.normal(problem.table, np.exp(strengths).tolist())
-    gram, far = found.gram, (strengths - TYPICAL) / SPREAD
-    constant = -0.5 * (gram[-1, -1] + found.log_det + 3 * found.rows * np.log(2.0 * np.pi) + float(far @ far))
-    return Equations(gram[:-1, :-1], gram[:-1, -1], constant, found.mean_bias, found.cov_mean_bias)
+    far = (strengths - TYPICAL) / SPREAD
+    square = found.gram[-1, -1] + found.log_det + 3 * found.rows * np.log(2.0 * np.pi) + float(far @ far)
+    return found, -0.5 * float(square)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +101,7 @@ def together(problems: Sequence[Problem], strengths: FloatArray) -> Together:
     L, half, evidence = _eliminated(problems, found)
     inverse = np.linalg.inv(L)
     change, shift, added = np.eye(len(L)), np.zeros(len(L)), np.zeros(L.shape)
-    for problem, one in zip(problems, found, strict=True):
+    for problem, (one, _) in zip(problems, found, strict=True):
         b, sigma = problem.index[problem.bias], problem.sigma[problem.bias]
         change[np.ix_(b, problem.index)] -= one.mean_bias[:, :-1] / sigma[:, None]
         shift[b] = one.mean_bias[:, -1] / sigma
@@ -123,11 +113,11 @@ def _eliminated(problems: Sequence[Problem], found: Sequence[Equations]) -> tupl
     """Cholesky root L of the information, L⁻¹ times the moment, and the log evidence."""
     n = 1 + max(int(p.index.max()) for p in problems)
     information, moment, centre, constant = np.eye(n), np.zeros(n), np.zeros(n), 0.0
-    for problem, one in zip(problems, found, strict=True):
-        information[np.ix_(problem.index, problem.index)] += one.information
-        moment[problem.index] += one.moment
+    for problem, (one, own) in zip(problems, found, strict=True):
+        information[np.ix_(problem.index, problem.index)] += one.gram[:-1, :-1]
+        moment[problem.index] += one.gram[:-1, -1]
         centre[problem.index] = problem.centre
-        constant += one.constant
+        constant += own
     moment += centre
     L = np.linalg.cholesky(information)
     half = np.linalg.solve(L, moment)

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.arrays import XYZ, FloatArray, sigmas_of
 from trihedron.errors import InputError
+from trihedron.estimate.reference.beside import places
 from trihedron.estimate.reference.likelihood import Problem, most_likely, together
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.estimate.reference.start import Start
@@ -74,9 +75,7 @@ def reject_two_clocks(found: MotionFit, k: int) -> None:
     if "clock" not in found.places[k]:
         return
     side, point = found.sides[k], found.points[k]
-    names = {name: at for name, at in found.places[k].items() if name in ("S", "b", "earth")}
-    index = np.cumsum([0, *(len(at) for at in names.values())])
-    where = {name: np.arange(a, b) for name, a, b in zip(names, index[:-1], index[1:], strict=True)}
+    where = places([side], ("S", "b", "earth"))[0]
     strengths = found.fitted.strengths[k : k + 1]
     shifts = SHIFT_S * np.arange(-round(REACH_S / SHIFT_S), round(REACH_S / SHIFT_S) + 1)
 

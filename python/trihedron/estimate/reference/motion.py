@@ -89,7 +89,7 @@ def fit_motion(
             replace(
                 side.moved(point, {name: side.sigma(name, wider) * mean[at] for name, at in own.items()}),
                 lost_s=np.append(point.lost_s, one),
-                slow=slow_error(side, problem, s, mean),
+                slow=None if side.reference.motion.attitude is None else slow_error(problem, s, mean),
             )
             for side, point, problem, own, s, one in zip(sides, points, problems, where, strengths, lost, strict=True)
         ]
@@ -105,11 +105,8 @@ def _deviating(problem: Problem, strengths: FloatArray, mean: FloatArray) -> Flo
     return np.asarray(problem.blocks.time_s()[p < SURPRISE / max(normal.rows, 1)])
 
 
-def slow_error(side: Beside, problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError | None:
-    """The reference's smoothed slow error under ``strengths`` (8,), at parameters ``mean`` with biases at the start;
-    ``None`` of a reference without attitudes."""
-    if side.reference.motion.attitude is None:
-        return None
+def slow_error(problem: Problem, strengths: FloatArray, mean: FloatArray) -> SlowError:
+    """The reference's smoothed slow error under ``strengths`` (8,), at parameters ``mean`` with biases at the start."""
     *_, world, body = problem.blocks.smoothed(problem.table, np.exp(strengths).tolist())
     theta = np.append(-mean[problem.index], 1.0)
     return SlowError(problem.blocks.time_s(), *((one @ theta).reshape(-1, 3) for one in (world, body)))

@@ -16,8 +16,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import matmul_toeplitz
 
-from trihedron.arrays import TINY, FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit
+from trihedron.estimate.reference.beside import SlowError
 from trihedron.estimate.reference.likelihood import STRENGTHS, Problem, together
 from trihedron.estimate.reference.motion import MotionFit, slow_error
 from trihedron.estimate.reference.together import Reference
@@ -59,50 +60,27 @@ def _bias_at(found: MotionFit, k: int, strengths: FloatArray) -> tuple[FloatArra
 
 
 def error_over_time(found: MotionFit, k: int) -> ErrorOverTime:
-    """Attitude of the reference of recording k relative to the gyro's, after subtraction of parameters and bias drift.
-
-    ``angle = observed - columns theta - Σ ΔM Δb``: M is the derivative of the angle by a constant bias, Δb the change
-    of the bias since the start.
-    """
-    problem = found.problems[k]
-    mean = together(found.problems, found.fitted.strengths).mean[problem.index]
-    strengths = np.exp(found.fitted.strengths[k])
-    columns, beside, _, _ = problem.blocks.smoothed(problem.table, strengths.tolist())
-    m = len(beside)
-    columns = columns.reshape(m, 3, -1)
-    walked = columns[:, :, -1] - columns[:, :, :-1] @ mean
-    acting = problem.columns.reshape(m, 3, -1)[:, :, problem.bias] / problem.sigma[problem.bias]
-    steps = np.einsum("mij,mj->mi", np.diff(acting, axis=0), 0.5 * (walked[1:] + walked[:-1]))
-    by_walk = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-    angle = (problem.observed - problem.columns @ mean).reshape(m, 3) - by_walk
-    angle[problem.blocks.rows()[:, 0] == 0] = np.nan
-    walk = float(strengths[STRENGTHS.index("angle_walk")])
-    time = problem.blocks.time_s()
-    # The attitude of every stretch begins anew, with a constant of its own.
-    for one in _stretches(found, k, time):
-        if np.isfinite(angle[one]).any():
-            angle[one] -= np.nanmean(angle[one], axis=0)
-    return ErrorOverTime(time, angle, walk)
+    """Smoothed slow error of the reference's attitude in recording k, along the axes of its world."""
+    blocks, slow = found.problems[k].blocks, _slow_error(found, k)
+    angle = slow.world + np.einsum("mij,mj->mi", blocks.attitude(), slow.body)
+    angle[blocks.rows()[:, 0] == 0] = np.nan
+    return ErrorOverTime(slow.time_s, angle)
 
 
-def _stretches(found: MotionFit, k: int, time: FloatArray) -> list[IntArray]:
-    """Blocks about ``time`` (m,) between gaps of the log and deviating blocks."""
-    side = found.sides[k]
-    missing = np.concatenate([[0], np.cumsum(~side.seen)])[np.searchsorted(side.grid.time_s, time)]
-    begins = (np.diff(missing) > 0) | found.points[k].deviates(time)[1:]
-    return np.split(np.arange(len(time)), 1 + np.flatnonzero(begins))
+def _slow_error(found: MotionFit, k: int) -> SlowError:
+    mean = together(found.problems, found.fitted.strengths).mean
+    return slow_error(found.problems[k], found.fitted.strengths[k], mean)
 
 
 def without_slow_error(found: MotionFit, k: int) -> Reference:
     """The reference of recording k with its slow error subtracted from its attitudes: gyro and reference together
     determine them better than either, and the remaining tilt error is small."""
-    side, point, problem = found.sides[k], found.points[k], found.problems[k]
+    side, point = found.sides[k], found.points[k]
     motion = side.reference.motion
-    slow = slow_error(side, problem, found.fitted.strengths[k], together(found.problems, found.fitted.strengths).mean)
-    if slow is None or motion.attitude is None:
+    if motion.attitude is None:
         return side.reference
     time = (motion.time_s - point.offset_s) / (1.0 + point.rate)
-    own = slow.compensated(time, motion.attitude @ point.mounting) @ point.mounting.T
+    own = _slow_error(found, k).compensated(time, motion.attitude @ point.mounting) @ point.mounting.T
     return Reference(replace(motion, attitude=np.ascontiguousarray(own)))
 
 
@@ -113,16 +91,13 @@ def error_carried(found: MotionFit, k: int, force: ForceFit, time_s: FloatArray)
     They are averaged over the posterior of the strengths. The mean of a slow error in the body frame is equivalent to a
     mounting: no motion determines it, and it rotates both sensors alike.
     """
-    side, problem, own, point = found.sides[k], found.problems[k], found.places[k], found.points[k]
+    side, problem, own = found.sides[k], found.problems[k], found.places[k]
     direct = np.zeros((len(force.wrt_clock), len(problem.index)))
     if "clock" in own:
         at = np.searchsorted(problem.index, own["clock"])
         since = np.stack([np.ones(len(time_s)), time_s - side.middle_s])
         direct[:, at] = force.wrt_clock @ since.T * problem.sigma[at]
-    nodes = None
-    if force.wrt_attitude is not None:
-        C = without_slow_error(found, k).attitude(time_s * (1.0 + point.rate) + point.offset_s) @ point.mounting
-        nodes = _on_nodes(problem, force.wrt_attitude, C, time_s)
+    nodes = None if force.wrt_attitude is None else _on_nodes(problem, force.wrt_attitude, time_s)
     used, *drawn = (
         _under(found, k, strengths, direct, nodes) for strengths in (found.fitted.strengths, *found.fitted.draws)
     )
@@ -176,21 +151,23 @@ def _prior(
 
 
 def _on_nodes(
-    problem: Problem, wrt_attitude: FloatArray, C: FloatArray, time_s: FloatArray
+    problem: Problem, wrt_attitude: tuple[FloatArray, FloatArray], time_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Responses (n, k, 3) to rotations about the world's axes at ``time_s`` (k,), with attitudes ``C``, distributed
-    over the two nearest blocks: (m, 3, n) to the world and to the body error."""
+    """Responses (n, k, 3) to the world and to the body error at ``time_s`` (k,), distributed over the two nearest
+    blocks: (m, 3, n) each."""
     at = problem.blocks.time_s()
     m = len(at)
     place = np.interp(time_s, at, np.arange(m))
     before = np.minimum(place.astype(np.int64), max(m - 2, 0))
     after = (place - before)[:, None, None]
-    world, body = np.zeros((m, 3, len(wrt_attitude))), np.zeros((m, 3, len(wrt_attitude)))
-    for out, responses in ((world, wrt_attitude), (body, np.einsum("nka,kab->nkb", wrt_attitude, C))):
-        each = np.moveaxis(responses, 0, 2)
+
+    def on_nodes(responses: FloatArray) -> FloatArray:
+        out, each = np.zeros((m, 3, len(responses))), np.moveaxis(responses, 0, 2)
         np.add.at(out, before, (1.0 - after) * each)
         np.add.at(out, np.minimum(before + 1, m - 1), after * each)
-    return world, body
+        return out
+
+    return on_nodes(wrt_attitude[0]), on_nodes(wrt_attitude[1])
 
 
 def _positive(covariance: FloatArray) -> FloatArray:

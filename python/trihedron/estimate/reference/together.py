@@ -67,18 +67,16 @@ class Reference:
         self.motion = motion
         t = motion.time_s
         self.step_s = float(np.median(np.diff(t)))
-        self._attitude: CubicSpline | None = None
-        attitude = motion.attitude
-        if attitude is None and motion.rate is not None and not motion.is_stepwise:
-            attitude = integrate_rate(t, motion.rate)
+        attitude, rate = motion.attitude, None if motion.is_stepwise else motion.rate
+        if attitude is None and rate is not None:
+            attitude = integrate_rate(t, rate)
+        known = {"rate": rate, "position": motion.position, "specific_force": motion.specific_force}
         if attitude is not None:
             q = Rotation.from_matrix(attitude).as_quat()
             flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
             q[1:] *= flips[:, None]
-            self._attitude = CubicSpline(t, q)
-        self._rate = None if motion.rate is None or motion.is_stepwise else CubicSpline(t, motion.rate)
-        self._position = None if motion.position is None else CubicSpline(t, motion.position)
-        self._force = None if motion.specific_force is None else CubicSpline(t, motion.specific_force)
+            known["quaternion"] = q
+        self._splines = {name: CubicSpline(t, value) for name, value in known.items() if value is not None}
 
     def covers(self, time: FloatArray) -> BoolArray:
         """Whether the reference has rows around these times (n,) of its own clock."""
@@ -88,20 +86,17 @@ class Reference:
 
     def attitude(self, time: FloatArray) -> FloatArray:
         """(n, 3, 3) body → world; of rates from an attitude of its own at the first row."""
-        assert self._attitude is not None
-        return np.asarray(Rotation.from_quat(self._attitude(self._clip(time))).as_matrix())
+        return np.asarray(Rotation.from_quat(self._of("quaternion", time)).as_matrix())
 
     def rate(self, time: FloatArray) -> FloatArray:
         """(n, 3) [rad/s] in the body; from an attitude by differentiation, with its noise."""
-        time = self._clip(time)
         if self.motion.is_stepwise:
             assert self.motion.rate is not None
-            row = np.clip(np.searchsorted(self.motion.time_s, time, side="right") - 1, 0, len(self.motion.time_s) - 1)
-            return self.motion.rate[row]
-        if self._rate is not None:
-            return np.asarray(self._rate(time))
-        assert self._attitude is not None
-        q, dq = self._attitude(time), self._attitude(time, 1)
+            row = np.searchsorted(self.motion.time_s, time, side="right") - 1
+            return self.motion.rate[np.clip(row, 0, len(self.motion.time_s) - 1)]
+        if "rate" in self._splines:
+            return self._of("rate", time)
+        q, dq = self._of("quaternion", time), self._of("quaternion", time, 1)
         norm = np.linalg.norm(q, axis=1, keepdims=True)
         q, dq = q / norm, dq / norm
         v, w, dv, dw = q[:, :3], q[:, 3:], dq[:, :3], dq[:, 3:]
@@ -110,16 +105,15 @@ class Reference:
 
     def position(self, time: FloatArray) -> FloatArray:
         """(n, 3) [m] in the world."""
-        assert self._position is not None
-        return np.asarray(self._position(self._clip(time)))
+        return self._of("position", time)
 
     def specific_force(self, time: FloatArray) -> FloatArray:
         """(n, 3) [m/s²] in the body."""
-        assert self._force is not None
-        return np.asarray(self._force(self._clip(time)))
+        return self._of("specific_force", time)
 
-    def _clip(self, time: FloatArray) -> FloatArray:
-        return np.clip(time, self.motion.time_s[0], self.motion.time_s[-1])
+    def _of(self, name: str, time: FloatArray, derivative: int = 0) -> FloatArray:
+        inside = np.clip(time, self.motion.time_s[0], self.motion.time_s[-1])
+        return np.asarray(self._splines[name](inside, derivative))
 
 
 # Commands of a rate table: samples on a plateau, where the table has reached the commanded rate.

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.estimate.reference.beside import Beside
 from trihedron.estimate.reference.likelihood import STRENGTHS
 from trihedron.estimate.reference.motion import MotionFit
 from trihedron.estimate.reference.residuals import fine_s, rate_left
@@ -45,7 +44,7 @@ def error_of(found: MotionFit, k: int = 0) -> ReferenceError:
         rows_left_out=int(rows[:, 1].sum()),
         gaps_s=_runs(time, ~seen & ~lost & (np.cumsum(seen) > 0) & (np.cumsum(seen[::-1])[::-1] > 0)),
         apart_s=_runs(time, lost),
-        signs=signs_of_this_gyro(found.sides[k], found, k),
+        signs=signs_of_this_gyro(found, k),
     )
 
 
@@ -55,13 +54,12 @@ def _runs(time: FloatArray, where: np.ndarray) -> tuple[tuple[float, float], ...
     return tuple((float(time[a]), float(time[min(b, last)])) for a, b in edges_of(where))
 
 
-def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ...]:
+def signs_of_this_gyro(found: MotionFit, k: int) -> tuple[Sign, ...]:
     """Evidence that the reference was computed from this gyro: it then confirms S and b, but does not measure them."""
-    motion = side.reference.motion
-    if motion.attitude is None:
+    if found.sides[k].reference.motion.attitude is None:
         return ()
     out = []
-    own, noise = residual_density(side, found, k), noise_at_rest(side, found, k)
+    own, noise = residual_density(found, k), noise_at_rest(found, k)
     if own < QUIETER * noise:
         out.append(Sign("quieter-than-gyro", float(own), float(noise)))
     cov = found.covariance(k, ("S", "b"))
@@ -73,16 +71,18 @@ def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ..
     return tuple(out)
 
 
-def residual_density(side: Beside, found: MotionFit, k: int) -> float:
+def residual_density(found: MotionFit, k: int) -> float:
     """White density [rad/s/√Hz] of the difference between gyro and reference from some 0.1 to 5 Hz."""
+    side = found.sides[k]
     _, rate = rate_left(side, found.points[k])
     # Means of a random walk over neighbouring blocks differ by 2/3 of its variance per block; the median is robust
     # to impacts and divided by that of chi-square with 3 degrees of freedom.
     return float(np.sqrt(np.median(np.sum(rate**2, axis=1)) * fine_s(side) / (2.0 / 3.0 * chdtri(3.0, 0.5))))
 
 
-def noise_at_rest(side: Beside, found: MotionFit, k: int) -> float:
+def noise_at_rest(found: MotionFit, k: int) -> float:
     """White density [rad/s/√Hz] of the gyro's noise in the quietest part of the log; motion adds to it elsewhere."""
+    side = found.sides[k]
     rate = side.corrected(found.points[k])
     n = max(len(rate) // QUIET_PARTS, 8)
     change = np.sum(np.diff(rate, axis=0) ** 2, axis=1) / 6.0
