@@ -10,7 +10,10 @@ from reference_rig import G, commanded_table, forces, hand, measured_table, rate
 from trihedron._core import rotation_from_vector
 from trihedron.api.beside import shared_log
 from trihedron.estimate.filter_noise.beside_reference import Request, beside_reference
+from trihedron.estimate.reference.accelerometer import fit_accelerometer
+from trihedron.estimate.reference.clocks import Alignment
 from trihedron.estimate.reference.fit import fit_reference
+from trihedron.estimate.reference.together import Reference, grid_of, windows_beside
 from trihedron.files.calibration import diagnosis_document
 from trihedron.records import Severity
 from trihedron.records.reference import NAMED_FROM, ReferenceMotion
@@ -50,6 +53,24 @@ def test_gyro_clock_and_lever_arm_come_out_within_their_error_bars(posed, found)
     assert np.all(np.abs(found.lever_arm.value - posed.arm) < 4.5 * found.lever_arm.std)
     assert np.all(found.lever_arm.std < 5e-3)
     assert np.degrees(np.arccos(found.vertical.value[2])) < 1.0
+
+
+def test_a_constant_error_of_the_references_body_moves_force_and_lever_arm_by_their_response_to_it(posed):
+    grid, clock = grid_of(posed.log), Alignment(posed.lead_s, 1e-6 * posed.ppm, 1.0)
+    seen = grid.is_valid & Reference(posed.motion).covers(grid.time_s + clock.offset_s)
+    error = 1e-4 * np.array([1.0, -2.0, 0.5])
+
+    def fitted(attitude):
+        reference = Reference(replace(posed.motion, attitude=attitude))
+        windows = windows_beside(grid, reference, seen, 0.1)
+        return fit_accelerometer(grid, reference, windows, clock, G, np.sign(np.linalg.det(posed.unit.M)))
+
+    usual, turned = (fitted(posed.motion.attitude @ rotation_from_vector(one[None])) for one in (0.0 * error, error))
+    expected = usual.wrt_attitude[1].sum(axis=1) @ error
+    # Of second order in 1e-4 rad, with some margin for the weights, which follow the residuals.
+    for part in (slice(0, 9), slice(9, 12), slice(15, 18)):
+        moved = (turned.values - usual.values)[part]
+        assert np.abs(moved - expected[part]).max() < 2e-3 * np.abs(expected[part]).max()
 
 
 def fine_unit(seed, earth=None):
