@@ -179,6 +179,17 @@ def test_a_temperature_that_a_drift_explains_as_well_names_both(tmp_path):
     assert "temperature" in thermal.separating_experiment
 
 
+def test_what_explains_poses_and_moves_is_named_before_a_line_and_this_before_a_scatter():
+    recording, truth = simulated("accel-quadratic", 3, 16, k2=(6e-4, -6e-4, 6e-4))
+    moved = with_scatter(recording, truth.poses, 0.07 * 131.0)
+    line = 30.0 * np.sin(2.0 * np.pi * 11.3 * recording.time_s)
+    shaken = replace(moved, gyroscope=moved.gyroscope + line[:, None])
+    effects = trihedron.diagnose(shaken, gravity_m_s2=truth.gravity_m_s2).effects
+    assert [one.id for one in effects] == ["accel-quadratic", "periodic-interference", "gyro-bias-repeatability"]
+    # Shares of the misfit of poses and moves, and of the variance inside poses: the larger number says nothing.
+    assert effects[1].share > effects[0].share
+
+
 def test_a_dead_band_is_measured():
     # Gyro readings within 60 counts of zero do not move; half-width to one count of 60.
     diagnosis = diagnosed("quantisation", 6, 14, sensor="gyroscope", dead_band=60.0)

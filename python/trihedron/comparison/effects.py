@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from trihedron.diagnose.accepted import HEADLINE
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.probability import ndtr
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, ParameterDifference
@@ -89,7 +88,7 @@ class ComparedEffects:
     @property
     def in_order(self) -> tuple[AcceptedEffect, ...]:
         """Missing before surplus; last those that are no mechanism of an instrument (a scatter, a disturbed pose)."""
-        return tuple(sorted((*self.missing, *self.surplus), key=_is_beside))
+        return tuple(sorted((*self.missing, *self.surplus), key=_place))
 
 
 def compare_effects(
@@ -149,10 +148,10 @@ def is_footnote(effect: AcceptedEffect, has_motion: bool) -> bool:
     return of.is_local or (of.is_of_motion and not (has_motion and share)) or (of.is_of_samples and share < FAINT)
 
 
-def _is_beside(effect: AcceptedEffect) -> bool:
-    """Whether it is listed after mechanisms: a scatter, or an effect with a small share of its own (a faint line)."""
-    is_stated = effect.side == "recording" and not effect.model.get("variant")
-    return by_id()[effect.id].is_spread or (is_stated and (effect.share or 0.0) < HEADLINE)
+def _place(effect: AcceptedEffect) -> tuple[bool, bool]:
+    """Mechanisms come first, then lines, then a scatter or what concerns one pose."""
+    of = by_id()[effect.id]
+    return of.is_minor, of.is_of_samples
 
 
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:

@@ -26,8 +26,8 @@ from trihedron.records.words import words
 from trihedron.session.model import misfits
 
 HEADLINE = 0.5
-"""Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) is listed
-after the effects that explain poses and moves."""
+"""Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) does not
+state why a recording disagrees."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class Answer:
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False
         beside = {one.effect.id for one in self.seen if not one.reobserves}
-        is_weak = [effect.is_spread or effect.is_local for effect, *_ in self.gains]
+        is_weak = [effect.is_minor for effect, *_ in self.gains]
         is_minor = [
             share < HEADLINE and (own is not None or weak or effect.id in beside)
             for (effect, _, own), share, weak in zip(self.gains, self.shares, is_weak, strict=True)
@@ -111,17 +111,15 @@ def excess(fitted: Fit) -> float:
 
 
 def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tuple[AcceptedEffect, ...]:
-    """Every accepted effect with its parameters, the largest share of the misfit first, minor effects last.
+    """Every accepted effect with its parameters: mechanisms by their share of the misfit of poses and moves, then what
+    shows inside the poses alone, whose share is of another misfit, then minor effects.
 
     ``residuals`` of the poses, in the fit with all effects, are stored with each effect's curve.
     """
     made = [*_of_terms(answer, residuals), *_of_biases(answer, residuals), *_of_samples(answer)]
-    rows = []
-    for record, (effect, _, own), share in zip(made, answer.gains, answer.shares, strict=True):
-        is_behind = effect.is_spread or (own is not None and share < HEADLINE)
-        is_beside = any(one.effect is effect and not one.reobserves for one in answer.seen)
-        rows.append(((is_behind, -share, is_beside), replace(record, share=share)))
-    return tuple(record for _, record in sorted(rows, key=lambda row: row[0]))
+    each = zip(answer.gains, answer.shares, made, strict=True)
+    order = sorted(each, key=lambda one: (one[0][0].is_minor, one[0][0].is_of_samples, -one[1]))
+    return tuple(replace(record, share=share) for _, share, record in order)
 
 
 def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[AcceptedEffect]:

@@ -93,6 +93,11 @@ class Effect:
     """Whether it concerns one pose only: its gain may come from one fold of the cross-validation, and it may be
     accepted once for each of several poses."""
 
+    @property
+    def is_minor(self) -> bool:
+        """Whether it is a scatter without a cause, or concerns one pose."""
+        return self.is_spread or self.is_local
+
     size: ClassVar[float] = 0.0
     """Typical size of one parameter in data sheets, one sigma, in the reported unit; 0 where :meth:`sizes` is
     overridden."""
