@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import polars
 import pytest
+from scipy.signal import lfilter
 
 import trihedron
 from diagnosed_session import diagnosed, nearest_pose, simulated, with_scatter
@@ -188,6 +189,19 @@ def test_what_explains_poses_and_moves_is_named_before_a_line_and_this_before_a_
     assert [one.id for one in effects] == ["accel-quadratic", "periodic-interference", "gyro-bias-repeatability"]
     # Shares of the misfit of poses and moves, and of the variance inside poses: the larger number says nothing.
     assert effects[1].share > effects[0].share
+
+
+def test_an_effect_that_resembles_a_relation_is_no_name_for_it():
+    """A gyro of which 0.4 % lag by a second: a delay of the other sensor explains most of it and leaves no relation."""
+    recording, truth = simulated(seed=2, n_poses=16)
+    rate_hz, lag_s = recording.rate_hz, 1.0
+    share = 1.0 - np.exp(-1.0 / (lag_s * rate_hz))
+    late = lfilter([share], [1.0, share - 1.0], recording.gyroscope - recording.gyroscope[0], axis=0)
+    slow = recording.gyroscope + 0.004 * (late + recording.gyroscope[0] - recording.gyroscope)
+    found = trihedron.diagnose(replace(recording, gyroscope=slow), gravity_m_s2=truth.gravity_m_s2)
+    assert found.verdict == "unexplained"
+    assert not found.effects
+    assert found.relations[0].depends_on[0] == "decaying rotations about x"
 
 
 def test_a_dead_band_is_measured():

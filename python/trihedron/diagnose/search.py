@@ -195,18 +195,14 @@ class _Search:
     def _beside_relations(
         self, model: Hypothesis, without: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
-        """Relations without a mechanism; an effect goes where those that are found without it score more, and one of
-        another sensor where it is not needed beside them."""
+        """Relations without a mechanism; an effect goes where it is not needed beside them, or where relations in its
+        place score more: beside an effect that resembles it nothing is left of a relation."""
         best = related(model, self.limit)
-        sensors = {one.effect.sensor for one in best.relations}
-        for k, (term, fewer) in enumerate(zip(model.terms, without, strict=True) if sensors else ()):
-            sides = (term.distortion.force, term.distortion.rate)
-            # What a relation could stand for has left something on its sensor.
-            if any(sides[one] is not None for one in sensors):
-                is_needless = related(fewer, self.limit, best.relations).score > best.score
-            else:
-                beside = again(best.model, [*best.model.terms[:k], *best.model.terms[k + 1 :]])
-                is_needless = 2.0 * (best.model.log_evidence - beside.log_evidence) - term.cost < self.limit
-            if is_needless:
+        for k, (term, fewer) in enumerate(zip(model.terms, without, strict=True)):
+            kept = [*best.model.terms[:k], *best.model.terms[k + 1 :]]
+            beside = again(best.model, kept) if best.relations else fewer
+            score = 2.0 * (best.model.log_evidence - beside.log_evidence) - term.cost
+            near = max(self.limit, score - WORTH_FITTING)
+            if score < self.limit or related(fewer, near, best.relations).score > best.score:
                 return self._beside_relations(*self._pruned(fewer))
         return model, without, best
