@@ -13,7 +13,7 @@ import trihedron
 from diagnosed_session import diagnosed, nearest_pose, simulated, with_scatter
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.accepted import Answer, tried_candidate
-from trihedron.diagnose.candidates import PRIOR_SCALES, Tried, terms_of
+from trihedron.diagnose.candidates import PRIOR_SCALES, Tried, as_fits_best, terms_of
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import threshold
@@ -178,6 +178,18 @@ def test_a_temperature_that_a_drift_explains_as_well_names_both(tmp_path):
     thermal = effects["gyro-thermal-bias"]
     assert thermal.confounded_with == ("gyro-bias-drift",)
     assert "temperature" in thermal.separating_experiment
+
+
+def test_a_fitted_time_constant_pays_for_its_place_between_those_of_the_grid():
+    """A temperature needs no time constant: without its price a warm-up of any fits noise better."""
+    model, effect = fitted("gyro-bias-drift", amplitude=(0.01, -0.01, 0.01), tau_s=20.0), by_id()["gyro-bias-drift"]
+    grid = [one for one in terms_of(model, effect, 0.0) if one.variant.label == "warm-up"]
+    asked, warm_up = max(zip(model.with_added(grid), grid, strict=True), key=lambda one: one[0].log_evidence)
+    found = as_fits_best(model, Tried(warm_up, 0.0, asked))
+    ((tau_s, _),) = found.variant.shape.values()
+    width = np.sqrt(2.0 * np.pi) * found.variant.shape_sigma / tau_s
+    assert width < np.log(2.5)
+    assert found.cost - warm_up.cost == pytest.approx(2.0 * np.log(np.log(2.5) / width))
 
 
 def test_what_explains_poses_and_moves_is_named_before_a_line_and_this_before_a_scatter():

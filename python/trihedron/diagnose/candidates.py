@@ -1,5 +1,6 @@
 """Every effect of the catalogue added to a hypothesis: which gain, how much, at which size and shape (eq. 11.19)."""
 
+import math
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -196,6 +197,8 @@ SHAPE_STEPS = 0.6 * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Steps of the logarithm of a shape parameter about the grid's best, to which a parabola is fitted."""
 N_RESHAPED = 2
 """Iterations of size and shape: the second changes them by a tenth of what the first does."""
+GRID_STEP = math.log(2.5)
+"""Usual distance between two values of a grid, as a logarithm."""
 STEP_LOG = 0.02
 """Half-step of the numerical derivative by the logarithm of a shape parameter."""
 
@@ -235,7 +238,10 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
     final = term.effect.reshaped(model.context, term.variant, value)
     if final is None:
         return term
-    return replace(term, variant=replace(final, shape={name: (value, unit)}, shape_sigma=abs(value) * min(sigma, 10.0)))
+    # The evidence is at its maximum over the shape, which pays for its place between two values of the grid.
+    cost = term.cost + 2.0 * max(math.log(GRID_STEP) - math.log(math.sqrt(2.0 * math.pi) * sigma), 0.0)
+    variant = replace(final, shape={name: (value, unit)}, shape_sigma=abs(value) * min(sigma, 10.0))
+    return replace(term, variant=variant, cost=cost)
 
 
 def renewed(model: Hypothesis) -> Hypothesis:
