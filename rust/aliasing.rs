@@ -1,4 +1,5 @@
-//! Motion faster than the samples: the error of every move's integral by aliasing (docs/diagnosis-method.md, 8.2a).
+//! What samples leave out: averaging over their interval, as decimating filters do (docs/model-session.md, 11.6d), and
+//! motion faster than the samples, by which every move's integral is in error (docs/diagnosis-method.md, 8.2a).
 //!
 //! A jolt on the table lasts a millisecond. Its power near the multiples of the sampling frequency f folds onto zero
 //! frequency and is integrated as velocity or angle. It is extrapolated by a power law. With power c ν^-p on either side
@@ -28,26 +29,66 @@ const OF_ITS_BAND: f64 = 0.4;
 /// Standard deviations of the noise's own power below which no motion is counted.
 const MARGIN: f64 = 3.0;
 
+/// A step longer than this many usual ones has lost samples.
+pub const GAP: f64 = 1.5;
+
 type Range = [usize; 2];
 
-/// Variance of the sum of the readings of every move by motion above half the sampling frequency.
+/// Readings at the middle of their interval T, where they are means over the share `a` of it: a mean m differs from the
+/// value in its middle by T²/24 of the second derivative, ω = m - a/24 (m₋ - 2 m + m₊).
 ///
-/// The poses give the power of the noise in both bands (their median), which is subtracted; at least `rounding`, the
-/// variance of rounding, because a pose whose bias stays inside one LSB does not show its rounding, moves do. Filters run
-/// from gap to gap, across which smooth motion would look fast: `gaps` are the first samples behind each.
+/// A filter adds twelve times the variance of its impulse response in sample intervals: 7.6 by a first-order low-pass with
+/// its corner at 0.2 of the rate, 0 by a Butterworth. For the angle of a move about one axis a does not matter; for
+/// rotations that do not commute it does, and moves determine it. No second difference is taken across lost samples.
+#[must_use]
+pub fn sharpened(readings: &[[f64; 3]], time: &[f64], a: f64) -> Vec<[f64; 3]> {
+    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let longest = GAP * median(&mut steps.clone());
+    let mut out = readings.to_vec();
+    for (k, (three, ends)) in readings.windows(3).zip(steps.windows(2)).enumerate() {
+        if ends.iter().any(|&step| step >= longest) {
+            continue;
+        }
+        for axis in 0..3 {
+            let second = (three[2][axis] - three[1][axis]) - (three[1][axis] - three[0][axis]);
+            out[k + 1][axis] -= if second.is_finite() {
+                a * second / 24.0
+            } else {
+                0.0
+            };
+        }
+    }
+    out
+}
+
+/// First samples behind gaps in the timestamps.
+fn behind_gaps(time: &[f64], step_s: f64) -> Vec<usize> {
+    let is_gap = |&k: &usize| time[k] - time[k - 1] > GAP * step_s;
+    (1..time.len()).filter(is_gap).collect()
+}
+
+/// Variance of the integral of the readings over every move by motion above half the sampling frequency.
+///
+/// The poses give the power of the noise in both bands (their median), which is subtracted; at least that of rounding by
+/// the LSB `quantum`, because a pose whose bias stays inside one LSB does not show its rounding, moves do. Filters run
+/// from gap to gap, across which smooth motion would look fast, by the `time` of samples at intervals of `step_s`.
 #[must_use]
 pub fn unresolved(
     readings: &[[f64; 3]],
     (moves, poses): (&[Range], &[Range]),
-    gaps: &[usize],
-    rounding: [f64; 3],
+    (time, step_s): (&[f64], f64),
+    quantum: [f64; 3],
 ) -> Vec<[f64; 3]> {
+    let (gaps, rounding) = (
+        behind_gaps(time, step_s),
+        quantum.map(|lsb| lsb * lsb / 12.0),
+    );
     let poses: Vec<Range> = poses
         .iter()
         .copied()
         .filter(|&one| windows(one) > 0)
         .collect();
-    let pieces: Vec<Vec<Range>> = moves.iter().map(|&one| between(one, gaps)).collect();
+    let pieces: Vec<Vec<Range>> = moves.iter().map(|&one| between(one, &gaps)).collect();
     let power = |taps: [f64; 5]| -> Vec<[f64; 3]> {
         let still = band_power(readings, taps, &poses);
         let level: [f64; 3] = std::array::from_fn(|axis| {
@@ -76,7 +117,7 @@ pub fn unresolved(
         pieces.iter().zip(moves).map(of_move).collect()
     };
     let (at_half, at_quarter) = (power(AT_HALF), power(AT_QUARTER));
-    let part = folded(&at_half, &at_quarter);
+    let part = folded(&at_half, &at_quarter) * step_s * step_s;
     at_half
         .iter()
         .map(|one| one.map(|value| value * part))

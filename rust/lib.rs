@@ -46,6 +46,7 @@ pub mod settling;
 pub mod simd;
 pub mod simulate;
 pub mod sinusoid;
+pub mod slow_noise;
 pub mod spectral_likelihood;
 pub mod stillness;
 pub mod telegraph;

@@ -214,11 +214,13 @@ def ends_to_trim(
     is_live: BoolArray,
     limit: float,
 ) -> tuple[int, int, bool]: ...
-def unresolved_power(
+def sharpened(readings: FloatArray, time_s: FloatArray, share: float) -> FloatArray: ...
+def unresolved_variance(
     readings: FloatArray,
     ranges: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]],
-    gaps: list[int],
-    rounding: FloatArray,
+    time_s: FloatArray,
+    step_s: float,
+    quantum: FloatArray,
 ) -> FloatArray: ...
 def share_of_gyroscope(change: FloatArray, mean: FloatArray, rate: FloatArray, scale: list[float]) -> list[float]: ...
 
@@ -250,6 +252,17 @@ def column_means(
 def block_differences(
     readings: FloatArray, ranges: npt.NDArray[np.int64], owner: npt.NDArray[np.int64], length: int
 ) -> tuple[list[float], int]: ...
+def half_changes(readings: FloatArray, ranges: npt.NDArray[np.int64]) -> FloatArray: ...
+def flicker_scatter(
+    readings: FloatArray, poses: npt.NDArray[np.int64], up: FloatArray | None, fewest: int
+) -> float: ...
+def coloured_variance(
+    readings: FloatArray,
+    poses: tuple[npt.NDArray[np.int64], FloatArray],
+    density: FloatArray,
+    step_s: float,
+    moves_last: Sequence[float],
+) -> FloatArray: ...
 def noise_change(
     readings: FloatArray,
     least: Sequence[float],
@@ -565,7 +578,7 @@ class SessionModel:
         moves: SessionMoves,
         noise: _Pair,
         prior: tuple[FloatArray, FloatArray, bool] | None,
-        scatter: tuple[FloatArray, float] | None,
+        scatter: tuple[FloatArray, float],
     ) -> SessionModel: ...
     def fit(
         self,
@@ -579,7 +592,6 @@ class SessionModel:
         is_near: bool = False,
         is_rough: bool = False,
     ) -> SessionFit: ...
-    def move_residuals(self, state: SessionState) -> FloatArray: ...
 
 @final
 class SessionFit:

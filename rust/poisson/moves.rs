@@ -4,11 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::steps::{StepWeights, step_weights};
 use super::{MoveRange, RateModel, RateNoise, Turn, WrtScale};
+use crate::aliasing::GAP;
 use crate::error::{Error, Result};
 use crate::rotation::{exp_and_left_jacobian, skew};
-
-/// A step longer than this many nominal ones has lost samples.
-const GAP: f64 = 1.5;
 
 /// A move as integration steps between those of its samples that are finite and of increasing time.
 pub(super) struct SteppedMove<'a> {

@@ -11,7 +11,8 @@ use crate::block_motion::{self, Edges, UNKNOWNS, Windows};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(ends_to_trim, module)?)?;
-    module.add_function(wrap_pyfunction!(unresolved_power, module)?)?;
+    module.add_function(wrap_pyfunction!(sharpened, module)?)?;
+    module.add_function(wrap_pyfunction!(unresolved_variance, module)?)?;
     module.add_function(wrap_pyfunction!(share_of_gyroscope, module)?)
 }
 
@@ -62,23 +63,37 @@ fn ends_to_trim(
     })
 }
 
-/// Variance `(m, 3)` of the sums of `readings` `(n, 3)` over moves by motion faster than the samples; `ranges` of moves
-/// and of poses, the first samples behind `gaps`, the variance of `rounding` `(3,)`.
+/// `readings` `(n, 3)` at the middle of their interval, with averaging over the `share` of it.
 #[pyfunction]
-fn unresolved_power<'py>(
+fn sharpened<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    time_s: PyReadonlyArray1<'py, f64>,
+    share: f64,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (flat, time) = (flat3("readings", &readings)?, flat1(&time_s));
+    let found = super::run(py, || Ok(aliasing::sharpened(as_rows(&flat), &time, share)))?;
+    rows(py, found.as_flattened(), 3)
+}
+
+/// Variance `(m, 3)`, (raw unit · s)², of the integrals of `readings` `(n, 3)` over moves by motion faster than the
+/// samples; `ranges` of moves and of poses, the LSB `quantum` `(3,)`.
+#[pyfunction]
+fn unresolved_variance<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray2<'py, f64>,
     ranges: (PyReadonlyArray2<'py, i64>, PyReadonlyArray2<'py, i64>),
-    gaps: Vec<usize>,
-    rounding: PyReadonlyArray1<'py, f64>,
+    time_s: PyReadonlyArray1<'py, f64>,
+    step_s: f64,
+    quantum: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let flat = flat3("readings", &readings)?;
+    let (flat, time) = (flat3("readings", &readings)?, flat1(&time_s));
     let within = |one| ranges_within(one, flat.len() / 3);
     let (moves, poses) = (within(&ranges.0)?, within(&ranges.1)?);
-    let rounding = vector3("rounding", &rounding)?.into();
+    let quantum = vector3("quantum", &quantum)?.into();
     let found = super::run(py, || {
-        let spans = (moves.as_slice(), poses.as_slice());
-        Ok(aliasing::unresolved(as_rows(&flat), spans, &gaps, rounding))
+        let (spans, when) = ((moves.as_slice(), poses.as_slice()), (&*time, step_s));
+        Ok(aliasing::unresolved(as_rows(&flat), spans, when, quantum))
     })?;
     rows(py, found.as_flattened(), 3)
 }

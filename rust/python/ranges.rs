@@ -4,14 +4,18 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArr
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_rows, flat1, flat2, flat3, rows};
+use super::arrays::{as_rows, flat1, flat2, flat3, rows, vector3};
 use crate::noise_change as changes;
 use crate::ranges;
+use crate::slow_noise;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(means_by_owner, module)?)?;
     module.add_function(wrap_pyfunction!(column_means, module)?)?;
     module.add_function(wrap_pyfunction!(block_differences, module)?)?;
+    module.add_function(wrap_pyfunction!(half_changes, module)?)?;
+    module.add_function(wrap_pyfunction!(flicker_scatter, module)?)?;
+    module.add_function(wrap_pyfunction!(coloured_variance, module)?)?;
     module.add_function(wrap_pyfunction!(noise_change, module)?)
 }
 
@@ -163,4 +167,74 @@ fn noise_change(
         ))
     })?;
     Ok(found.map(|c| (c.first, c.last, c.axes, c.ratio, c.sigma, c.score, c.share)))
+}
+
+/// `(k, 3)` mean over the second half of every range `(k, 2)` less that over the first.
+#[pyfunction]
+fn half_changes<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    ranges: PyReadonlyArray2<'py, i64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let readings = flat3("readings", &readings)?;
+    let ranges = ranges_within(&ranges, readings.len() / 3)?;
+    let found = super::run(py, || Ok(slow_noise::steps(as_rows(&readings), &ranges, 2)))?;
+    rows(py, found.as_flattened(), 3)
+}
+
+/// Scatter of the biases of `poses` `(h, 2)` by flicker inside them, raw; along the verticals `up` `(h, 3)`, or the rms of
+/// the axes. 0 with fewer usable poses than `fewest`.
+#[pyfunction]
+fn flicker_scatter(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+    poses: PyReadonlyArray2<'_, i64>,
+    up: Option<PyReadonlyArray2<'_, f64>>,
+    fewest: usize,
+) -> PyResult<f64> {
+    let readings = flat3("readings", &readings)?;
+    let poses = ranges_within(&poses, readings.len() / 3)?;
+    let up = up.as_ref().map(|up| flat3("up", up)).transpose()?;
+    if up.as_ref().is_some_and(|up| up.len() != 3 * poses.len()) {
+        return Err(PyValueError::new_err("every pose has a vertical"));
+    }
+    super::run(py, || {
+        let up = up.as_deref().map(as_rows);
+        Ok(slow_noise::flicker_scatter(
+            as_rows(&readings),
+            &poses,
+            up,
+            fewest,
+        ))
+    })
+}
+
+/// Variance `(m, 3)`, (raw unit · s)², that slow noise adds to integrals over moves that last `moves_last` `(m,)` s: of
+/// the `poses` `(h, 2)` and the standard errors `(h, 3)` of their means, white noise `density` `(3,)` per √Hz.
+#[pyfunction]
+fn coloured_variance<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    poses: (PyReadonlyArray2<'py, i64>, PyReadonlyArray2<'py, f64>),
+    density: PyReadonlyArray1<'py, f64>,
+    step_s: f64,
+    moves_last: Vec<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (readings, sigma) = (flat3("readings", &readings)?, flat3("sigma", &poses.1)?);
+    let poses = ranges_within(&poses.0, readings.len() / 3)?;
+    if sigma.len() != 3 * poses.len() {
+        return Err(PyValueError::new_err("every pose has a standard error"));
+    }
+    let density = vector3("density", &density)?.into();
+    let found = super::run(py, || {
+        let poses = (poses.as_slice(), as_rows(&sigma));
+        Ok(slow_noise::coloured_variance(
+            as_rows(&readings),
+            poses,
+            density,
+            step_s,
+            &moves_last,
+        ))
+    })?;
+    rows(py, found.as_flattened(), 3)
 }

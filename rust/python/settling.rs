@@ -2,11 +2,13 @@
 
 use nalgebra::Vector3;
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat3, matrix3};
 use super::ranges::ranges_within;
 use crate::settling::{self, PoseMotion, Poses};
+use crate::slow_noise::quiet_errors;
 use crate::time_errors;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -22,7 +24,7 @@ type Moving<'py> = (f64, f64, Ends<'py>, Ends<'py>, Bound<'py, PyArray2<f64>>);
 /// Score of settling beside scatter, the score of a bias that settles, and of every pose: mean rate by motion with its
 /// variance `(h, 2, 3)`, change of the vertical from the mean to both edges `(h, 2, 3)`, variance of that rotation
 /// `(h, 2)`. `None` with fewer poses than `fewest`. Gyro first: `readings` `(n, 3)`, `scale` `(3, 3)`, `noise`
-/// `(h, 3)` white; `up` `(h, 3)`; `spans` `(h, 2)` of the poses, then from the end of the move before to the beginning of
+/// `(h, 3)` white, to which the slow noise of quiet poses is added; `up` `(h, 3)`; `spans` `(h, 2)` of the poses, then from the end of the move before to the beginning of
 /// the next.
 #[pyfunction]
 #[pyo3(signature = (readings, scale, noise, up, spans, *, gravity_m_s2, step_s, fewest, certain))]
@@ -48,11 +50,22 @@ fn settling_of_poses<'py>(
     let scale = [matrix3("S", &scale[0])?, matrix3("S", &scale[1])?];
     let n = rate.len().min(force.len()) / 3;
     let [spans, edges] = [ranges_within(&spans[0], n)?, ranges_within(&spans[1], n)?];
+    if [&of_rate, &of_force]
+        .iter()
+        .any(|of| of.len() != 3 * spans.len())
+    {
+        return Err(PyValueError::new_err("every pose has noise"));
+    }
     let found = super::run(py, || {
+        let readings = [as_rows(&rate), as_rows(&force)];
+        let noise = [
+            quiet_errors(readings[0], &spans, as_rows(&of_rate)),
+            quiet_errors(readings[1], &spans, as_rows(&of_force)),
+        ];
         let poses = Poses {
-            readings: [as_rows(&rate), as_rows(&force)],
+            readings,
             scale,
-            noise: [as_rows(&of_rate), as_rows(&of_force)],
+            noise: [&noise[0], &noise[1]],
             up: as_rows(&up),
             spans: &spans,
             edges: &edges,

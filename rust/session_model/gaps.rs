@@ -7,9 +7,8 @@
 use nalgebra::Vector3;
 
 use super::moves::Move;
+use crate::aliasing::GAP;
 
-/// A step longer than this many usual ones has lost samples.
-pub const GAP: f64 = 1.5;
 /// Places nearest to a gap that count: motion is quicker in the middle of a move than at its ends.
 const NEAREST: usize = 24;
 /// Places that the session's mean square is worth: those of one move describe it within a factor of two or so.

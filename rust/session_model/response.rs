@@ -6,9 +6,9 @@ use std::f64::consts::PI;
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
 use super::N_SCATTER;
-use super::gaps::GAP;
 use super::moves::{Carried, Move, MoveCovariance, MoveModel, MoveNoise, N_MOVE};
 use super::sample_noise::of_samples;
+use crate::aliasing::GAP;
 use crate::rotation::skew;
 
 /// Derivatives of the five residuals by rate and force at each sample.

@@ -10,11 +10,11 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
 from trihedron.errors import InputError
+from trihedron.estimate.sessions.changes import between_sessions
 from trihedron.invariants import invariants, jacobian
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain
-from trihedron.session.noise import between_sessions
 from trihedron.units import si_of
 
 

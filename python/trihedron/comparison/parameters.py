@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 from trihedron.arrays import AXES, TINY, FloatArray, rms_of, sigmas_of
 from trihedron.comparison.fitted import FittedModel, FittedSensor
+from trihedron.estimate.sessions.changes import DRIFT_DOF
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.probability import STRONG, chdtri, fdtrc
 from trihedron.records.diagnosis import RELATIVE, ParameterDifference
 from trihedron.records.words import words
-from trihedron.session.noise import DRIFT_DOF, NOISE_DOF
+from trihedron.session.noise import NOISE_DOF
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 Sensor = Literal["accelerometer", "gyroscope", "both"]
@@ -190,8 +191,8 @@ def _sensor(
     pairs = tuple(AXES[i] + AXES[j] for i, j in PAIRS)
     # S is SI per raw unit: a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
-        _Group(f"{prefix}-bias", sensor, AXES, a.bias, r.bias, r.bias - a.bias, covariance[:3, :3], unit, DRIFT_DOF,
-               _never_added(prefix, a.bias, r.bias, spread, given.drift)),
+        _Group(f"{prefix}-bias", sensor, AXES, a.bias, r.bias, r.bias - a.bias, covariance[:3, :3], unit,
+               2.0 * DRIFT_DOF, _never_added(prefix, a.bias, r.bias, spread, given.drift)),
         _Group(
             f"{prefix}-scale", sensor, AXES, np.exp(log_m), np.exp(log_r), log_r - log_m, of_scale, "1",
             remark=_relative_to(prefix, a, r, is_recording=seen.si is None) if is_relative else "",

@@ -7,14 +7,14 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, rms_of
-from trihedron.estimate.sessions.changes import bias_drift
+from trihedron.estimate.sessions.changes import DRIFT_DOF, bias_drift
 from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import RELATIVE
 from trihedron.records.sessions import PARAMETERS
 from trihedron.records.verification import JudgedParameter
 from trihedron.sensor_model import in_frame
-from trihedron.session.noise import DRIFT_DOF, NOISE_DOF
+from trihedron.session.noise import NOISE_DOF
 from trihedron.units import acceleration_to_si, rate_to_si
 
 TOO_VAGUE = 10.0
@@ -68,7 +68,7 @@ def shifted_parameters(parameters: tuple[JudgedParameter, ...]) -> list[JudgedPa
     if not judged or not any(one.sigma_file > 0.0 for one in parameters):
         return []
     chance = 1.0 - 0.5 * probability.FALSE_ALARM / len(judged)
-    limits = [probability.stdtrit(DRIFT_DOF if one.id.endswith("bias") else NOISE_DOF, chance) for one in judged]
+    limits = [probability.stdtrit(2.0 * DRIFT_DOF if one.id.endswith("bias") else NOISE_DOF, chance) for one in judged]
     beyond = [one for one, limit in zip(judged, limits, strict=True) if abs(one.times_sigma) > limit]
     return sorted(beyond, key=lambda one: -abs(one.times_sigma))
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron import probability
+from trihedron import _core, probability
 from trihedron.arrays import AXES, FloatArray, rms_of
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity
 from trihedron.session.drift import TYPICAL
-from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF, expected_scatter
+from trihedron.session.noise import FEWEST_POSES, NOISE_CORNER_S, NOISE_DOF
 
 
 def static_rate(gyroscope: SensorCalibration | None, segments: Segments) -> tuple[FloatArray, FloatArray]:
@@ -43,7 +43,7 @@ def expected_change(known: Calibration, recording: Recording, segments: Segments
         return noise
     spans = segments.spans
     scale = float(np.cbrt(abs(np.linalg.det(gyro.S))))
-    variance = noise**2 + (scale * expected_scatter(recording.gyroscope, spans)) ** 2
+    variance = noise**2 + (scale * _core.flicker_scatter(recording.gyroscope, spans, None, FEWEST_POSES)) ** 2
     if segments.gyroscope_sigma is not None:
         density2 = (np.asarray(segments.gyroscope_sigma) ** 2 @ (gyro.S**2).T) / recording.rate_hz
         # White noise and walk have equal Allan variance at the corner; a walk of length T is T/6 about its mean.

@@ -7,8 +7,9 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.probability import STRONG
-from trihedron.session.averaging import GAP
 
+GAP = 1.5
+"""A step longer than this many usual ones has lost samples, as in the session model."""
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.defaults import FALSE_ALARM
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Pose
-from trihedron.session.noise import FEWEST_POSES, SessionNoise, quiet_errors
+from trihedron.session.noise import FEWEST_POSES, SessionNoise
 from trihedron.session.rounding import UNIFORM, undithered_axes
 
-CERTAIN = 2.0 * math.log(99.0)
+CERTAIN = 2.0 * math.log(1.0 / FALSE_ALARM - 1.0)
 """Twice the logarithm of the odds at which biases that scatter are certain beside a support: those at which they are
 named."""
 
@@ -69,13 +70,13 @@ def support_of(
     for before, start, stop in moves:
         edges[before, 1], edges[before + 1, 0] = start, stop
     step_s, n = 1.0 / recording.rate_hz, np.maximum(spans[:, 1] - spans[:, 0], 1)
-    readings, errors = (recording.gyroscope, recording.accelerometer), []
+    errors = []
     steps = (recording.facts.of(name).step for name in ("gyroscope", "accelerometer"))
-    for raw, step, density in zip(readings, steps, (noise.rate_density, noise.force_density), strict=True):
+    for step, density in zip(steps, (noise.rate_density, noise.force_density), strict=True):
         rounding = UNIFORM * step**2 * undithered_axes(step, density / np.sqrt(step_s))
-        errors.append(quiet_errors(raw, spans, np.sqrt(density**2 / (n * step_s)[:, None] + rounding)))
+        errors.append(np.sqrt(density**2 / (n * step_s)[:, None] + rounding))
     found = _core.settling_of_poses(
-        readings, near[:2], (errors[0], errors[1]), near[2],
+        (recording.gyroscope, recording.accelerometer), near[:2], (errors[0], errors[1]), near[2],
         (spans, np.sort(edges, axis=1)), gravity_m_s2=gravity_m_s2, step_s=step_s, fewest=FEWEST_POSES, certain=CERTAIN,
     )  # fmt: skip
     return None if found is None else Support(*found)

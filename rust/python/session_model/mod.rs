@@ -8,16 +8,12 @@ mod read_out;
 use std::sync::Arc;
 
 use nalgebra::{SMatrix, Vector3};
-use numpy::{
-    PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-    PyUntypedArrayMethods, ToPyArray,
-};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::rows3;
 use crate::session_model::fit::{Extent, fit};
-use crate::session_model::move_rows::Weights;
 use crate::session_model::moves::MoveNoise;
 use crate::session_model::strength_search::Within;
 use crate::session_model::strengths::tune;
@@ -144,18 +140,14 @@ impl SessionModel {
         moves: &SessionMoves,
         noise: Pair,
         prior: Option<(PyReadonlyArray1<'_, f64>, Array2<'_>, bool)>,
-        scatter: Option<(Array2<'_>, f64)>,
+        scatter: (Array2<'_>, f64),
     ) -> PyResult<Self> {
         let prior = prior
             .map(|(mean, covariance, is_weak)| prior_of(&mean, &covariance, is_weak))
             .transpose()?;
-        let expected_scatter = scatter.as_ref().map_or(0.0, |(_, expected)| *expected);
-        let scatter = scatter
-            .map(|(array, ..)| match rows3("scatter", &array)?.as_slice() {
-                [a, b] => Ok([*a, *b]),
-                _ => Err(PyValueError::new_err("scatter must have shape (2, 3)")),
-            })
-            .transpose()?;
+        let [force_unit, rate_unit] = rows3("scatter", &scatter.0)?[..] else {
+            return Err(PyValueError::new_err("scatter must have shape (2, 3)"));
+        };
         let (jitter_s, nominal_step_s) = noise;
         let noise = MoveNoise {
             force_density: poses.force.density,
@@ -175,8 +167,8 @@ impl SessionModel {
             moves: Arc::clone(&moves.moves),
             noise,
             prior,
-            scatter,
-            expected_scatter,
+            scatter: Some([force_unit, rate_unit]),
+            expected_scatter: scatter.1,
         };
         super::run(py, || session.check())?;
         Ok(Self {
@@ -231,28 +223,6 @@ impl SessionModel {
             None => fit(&session, start, strengths, &effects, extent),
         })?;
         Ok(SessionFit::new(Arc::clone(&self.session), found))
-    }
-
-    /// `(moves, 5)` whitened residuals of the moves at a state, without a fit.
-    fn move_residuals<'py>(
-        &self,
-        py: Python<'py>,
-        state: &SessionState,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let start = self.checked(state)?;
-        let session = Arc::clone(&self.session);
-        let (weights, passed) = super::run(py, || {
-            let planes = session.planes(&start);
-            let passed = session.pass(&start, &Distortion::default(), &planes);
-            Ok((Weights::gaussian(&passed, &Strengths::NONE)?, passed))
-        })?;
-        let flat: Vec<f64> = weights
-            .white
-            .iter()
-            .zip(&passed)
-            .flat_map(|(white, one)| (white * one.carried.residual).as_slice().to_vec())
-            .collect();
-        flat.to_pyarray(py).reshape([passed.len(), 5])
     }
 }
 

@@ -10,8 +10,7 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.probability import STRONG
 from trihedron.ranges import rows_beside
 from trihedron.records import Finding, Recording, Segments, Severity
-from trihedron.session.averaging import GAP
-from trihedron.session.joints import Joints, joints
+from trihedron.session.joints import GAP, Joints, joints
 
 EVEN = 1e-4
 """Scatter of the timestamps, in steps, up to which they may be computed from the row number."""

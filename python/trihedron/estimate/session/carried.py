@@ -19,7 +19,6 @@ from trihedron.estimate.session.fit import SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records import Calibration, FitQuality, Segments
 from trihedron.sensor_model import in_frame, norms
-from trihedron.session.averaging import sharpened
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
 from trihedron.session.noise import along_gradient
 from trihedron.transforms import directions_of
@@ -184,7 +183,7 @@ def carried(
 def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurements, segments: Segments) -> Carried:
     """:func:`carried` with a calibration's accelerometer and averaging, and the gyro's scale ``S_w`` (3, 3)."""
     accelerometer = calibration.accelerometer
-    read = replace(measured, rate=sharpened(measured.rate, measured.time_s, calibration.averaging))
+    read = replace(measured, rate=_core.sharpened(measured.rate, measured.time_s, calibration.averaging))
     return carried(read, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, S_w)
 
 

@@ -13,7 +13,6 @@ from trihedron.estimate.session.observed import EITHER, Observed
 from trihedron.probability import FALSE_ALARM, MEDIAN_CHI2, chdtri, fdtrc
 from trihedron.quantiles import median
 from trihedron.records.words import words
-from trihedron.session.averaging import sharpened
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, SessionState, core_state, misfits, state_of
 from trihedron.session.noise import ANYTHING, NOISE_DOF, START_STRENGTHS, Bounds, Strengths
 
@@ -70,7 +69,7 @@ class SessionSolution:
         if self.g_sensitivity is not None:
             by_force = np.asarray(np.linalg.solve(self.S_w, self.g_sensitivity[0]))
             measured = measured.without_g_sensitivity(by_force, self.S_a, self.b_a)
-        rate = sharpened(measured.rate, measured.time_s, self.averaging) - measured.is_hidden * place
+        rate = _core.sharpened(measured.rate, measured.time_s, self.averaging) - measured.is_hidden * place
         shared = effect[len(hidden) + 1 :][: measured.shared_errors.shape[2]]
         return replace(measured, rate=rate - measured.shared_errors @ shared, bias=measured.bias - place)
 

@@ -13,7 +13,6 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.earth import left_by_earth, turned_with_earth
 from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
-from trihedron.session.averaging import sharpened
 from trihedron.session.model import LOWER, Prior, SessionReadings
 from trihedron.session.noise import measure_noise
 from trihedron.session.rounding import UNIFORM
@@ -97,7 +96,7 @@ def arranged(
     if not ranges:
         raise InputError("readings are missing in every move: each row needs both sensors")
     noise, unresolved = measure_noise(recording, segments, [(int(rows[a]), int(rows[b - 1]) + 1) for a, b in ranges])
-    force, rate = (sharpened(values, measured.time_s, EITHER) for values in (readings, measured.rate))
+    force, rate = (_core.sharpened(values, measured.time_s, EITHER) for values in (readings, measured.rate))
     assert noise.pose_rate_sigma is not None
     assert noise.rate_density is not None
     # Variance of rounding and of bridged clipping, in addition to that of any session.
@@ -163,7 +162,9 @@ def _effects(
     ``edges`` (m, 2) and ``kept`` (k,) the samples of the moves."""
     n_poses = len(measured.reading)
     places = np.eye(3)[:, measured.is_undithered]
-    force, rate = ((values - sharpened(values, measured.time_s, 1.0))[kept] for values in (readings, measured.rate))
+    force, rate = (
+        (values - _core.sharpened(values, measured.time_s, 1.0))[kept] for values in (readings, measured.rate)
+    )
     time_s = recording.with_distinct_timestamps().time_s[measured.rows]
     none = np.zeros((*force.shape, places.shape[1]))
     shared = measured.shared_errors[kept]
