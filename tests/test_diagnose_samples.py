@@ -7,9 +7,10 @@ import pytest
 
 import trihedron
 from diagnosed_session import diagnosed, simulated, unit_of
+from trihedron.diagnose.bias_strengths import noise_bounds
+from trihedron.diagnose.hypothesis import hypothesis
 from trihedron.diagnose.residuals.noise_level import noise_changes
 from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.simulate import hand_session, scenario_by_name, simulate, with_effect
 
@@ -35,7 +36,7 @@ def test_the_bias_of_a_gyro_that_noise_does_not_dither_is_as_uncertain_as_its_ls
     calibration = trihedron.calibrate(coarse, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(coarse, trihedron.segment(coarse), calibration.averaging)
     assert obs.undithered.all()
-    covariance, bias = tune_noise(obs, start_state(obs, calibration), None).linear
+    covariance, bias = hypothesis(obs, start_state(obs, calibration), None, within=noise_bounds(obs)).fitted.linear
     error = bias - unit_of(hand_session(24, layout=2), 2).gyroscope.b
     # With a rounding error of its own in every pose these were 3.8, 0.7 and 2.8 σ.
     assert (np.abs(error) < 2.5 * np.sqrt(np.diag(covariance)[-3:])).all()

@@ -10,9 +10,11 @@ from scipy.spatial.transform import Rotation
 from diagnosed_session import nearest_pose, simulated
 from small_session import G
 from small_session import simulated as of_motion
-from trihedron import calibrate, diagnose
+from trihedron import _core, calibrate, diagnose
+from trihedron.diagnose.bias_strengths import noise_bounds
+from trihedron.diagnose.hypothesis import hypothesis
 from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.solve import _folds, predict_held_out, tune_noise
+from trihedron.diagnose.session.solve import folds
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.session.earth import left_in_move, turned_with_earth
@@ -22,7 +24,6 @@ from trihedron.records.published import published_figures
 from trihedron.report.calibration_fit import figures_table
 from trihedron.report.machine import calibration_record
 from trihedron.segment import segment_recording
-from trihedron.session.averaging import unresolved_variance
 from trihedron.session.model import MOVES
 from trihedron.simulate import hand_session
 
@@ -71,7 +72,7 @@ def fitted_to(recording, gravity):
     segments = segment_recording(recording)
     calibration = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
     obs = observe(recording, segments)
-    return tune_noise(obs, start_state(obs, calibration), None), calibration
+    return hypothesis(obs, start_state(obs, calibration), None, within=noise_bounds(obs)).fitted, calibration
 
 
 def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_data):
@@ -99,9 +100,9 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
     # Two factorisations of one matrix of condition 1e6: ten digits are left, the ridge takes the rest.
     np.testing.assert_allclose(fitted.covariance(), covariance[:18, :18], rtol=1e-6, atol=0)
     np.testing.assert_allclose(fitted.leverage, np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
-    folds = _folds(fitted)
-    found = predict_held_out(fitted)
-    for k, held in enumerate(folds):
+    blocks = folds(fitted)
+    found, log_det, *_ = fitted.core.held_out(blocks)
+    for k, held in enumerate(blocks):
         train = scaled[~held]
         cov = np.linalg.inv(train.T @ train + 1e-9 * eye)
         spread = scaled[held] @ cov @ scaled[held].T + np.eye(held.sum())
@@ -109,11 +110,11 @@ def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_an
         value, vector = np.linalg.eigh(spread)
         known = value < 1e7
         chi2 = float(((vector.T @ innovation)[known] ** 2 / value[known]).sum())
-        assert found.fold_chi2[k].sum() == pytest.approx(chi2, rel=1e-6)
+        assert found[k].sum() == pytest.approx(chi2, rel=1e-6)
         # In the readings' own units: whitened moves bring the determinant of their whitening.
         own = np.unique(fitted.system.segment[held & (fitted.system.domain == MOVES)]).astype(int)
         whitening = np.log(np.einsum("mii->mi", fitted.core.whitening()[own])).sum()
-        assert found.fold_log_det[k] == pytest.approx(np.log(value[known]).sum() - 2.0 * whitening, abs=1e-6)
+        assert log_det[k] == pytest.approx(np.log(value[known]).sum() - 2.0 * whitening, abs=1e-6)
 
 
 @pytest.mark.parametrize(("name", "expected_mm_s2"), [("adxl355", 3.0), ("bmi160", 2.6)])
@@ -208,7 +209,8 @@ def test_a_rate_that_steps_between_samples_is_charged_with_what_its_integral_mis
     missed += 0.5 * jumps * step  # the first sample after the jump comes half a step late in the mean
     ranges = tuple((k * n + 50, k * n + 150) for k in range(moves))
     poses = [(k * n + 5, k * n + 45) for k in range(moves)]
-    charged = unresolved_variance(rate, ranges, poses, step, np.zeros(3))
+    time_s = step * np.arange(len(rate))
+    charged = _core.unresolved_variance(rate, (np.array(ranges), np.array(poses)), time_s, step, np.zeros(3))
     # 900 squares of a jump times a phase have a mean certain to 7 %: two of those, and a tenth for the width of the
     # band, over which a step's power is above that at its middle.
     assert np.mean(missed**2) == pytest.approx(np.mean(charged), rel=0.25)

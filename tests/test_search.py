@@ -13,8 +13,9 @@ import trihedron
 from diagnosed_session import diagnosed, nearest_pose, simulated, with_scatter
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.accepted import Answer, tried_candidate
-from trihedron.diagnose.candidates import PRIOR_SCALES, Tried, as_fits_best, terms_of
+from trihedron.diagnose.candidates import Tried, as_fits_best, terms_of
 from trihedron.diagnose.effects import by_id, catalogue
+from trihedron.diagnose.effects.contract import PRIOR_SCALES
 from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import threshold
 from trihedron.diagnose.session.observations import observe
@@ -73,7 +74,7 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     ((tuned, strengths, value, covariance),) = core.evidence(asked, [core.strengths], ANYTHING)
     ((looked, at, spread),) = core.candidate_gains(asked, [1.0], [strengths])
     state = model.fitted.state
-    session = model.obs.model(state.gravity, None, is_scatter_free=True)
+    session = model.obs.model(state.gravity, None)
     plain = session.fit(state=core_state(state), strengths=strengths, force_effect=None, rate_effect=None).log_marginal
     assert tuned - plain == pytest.approx(looked[0, 0], abs=0.05)  # moves are carried anew: second order
     # With the column the weights of moves are those of the residuals that it leaves: a look keeps the session's.
@@ -119,7 +120,7 @@ def test_a_relation_beside_the_place_and_the_motion_alone_is_unexplained(named, 
         found=found,
         gains=gains,
         shares=[0.8],
-        seen=(),
+        beside=set(),
         biases=(),
     )
     assert Answer.says_why.fget(answer) is is_explained

@@ -11,11 +11,10 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.bias_strengths import BiasStrength, explain_as_much
 from trihedron.diagnose.candidates import Tried, wald_p
 from trihedron.diagnose.effects import by_id, catalogue
-from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.effects.contract import Effect, Evidence
 from trihedron.diagnose.hypothesis import Hypothesis, held_out_records
 from trihedron.diagnose.residuals.effect_curves import bias_curves, effect_curves
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS
-from trihedron.diagnose.sample_evidence import Seen
 from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
@@ -45,7 +44,7 @@ class Answer:
     found: Found
     numbers: Hypothesis
     biases: Sequence[BiasStrength]
-    seen: Sequence[Seen]
+    seen: Mapping[str, Evidence]
     judged: Fit
     """Fit with all accepted effects, noise strengths bounded to the part's noise; remaining misfit is judged on it."""
     asked: Mapping[str, BiasStrength]
@@ -56,7 +55,7 @@ class Answer:
     @property
     def ids(self) -> set[str]:
         terms = {term.effect.id for term in self.found.model.terms}
-        return terms | {one.effect.id for one in self.biases} | {one.effect.id for one in self.seen}
+        return terms | {one.effect.id for one in self.biases} | self.seen.keys()
 
     @property
     def gains(self) -> list[tuple[Effect, float, float | None]]:
@@ -64,7 +63,7 @@ class Answer:
         return [
             *((term.effect, gain, None) for term, gain in zip(self.found.model.terms, self.found.gains, strict=True)),
             *((one.effect, one.gain, None) for one in self.biases),
-            *((one.effect, one.gain, one.evidence.share) for one in self.seen),
+            *((by_id()[key], one.strength, one.share) for key, one in self.seen.items()),
         ]
 
     @property
@@ -75,6 +74,11 @@ class Answer:
         whole = sum(max(gain, 0.0) for _, gain, own in gains if own is None)
         whole = max(whole + sum(one.score for one in self.found.related.relations) + excess(self.judged), TINY)
         return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
+
+    @property
+    def beside(self) -> set[str]:
+        """Ids of effects seen in the samples that change no observation (no gaps of time, no moves excluded)."""
+        return {key for key, one in self.seen.items() if one.reweigh is None}
 
     @property
     def says_why(self) -> bool:
@@ -95,10 +99,9 @@ class Answer:
         )
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False
-        beside = {one.effect.id for one in self.seen if not one.reobserves}
         is_weak = [effect.is_minor for effect, *_ in self.gains]
         is_minor = [
-            share < HEADLINE and (own is not None or weak or effect.id in beside)
+            share < HEADLINE and (own is not None or weak or effect.id in self.beside)
             for (effect, _, own), share, weak in zip(self.gains, self.shares, is_weak, strict=True)
         ]
         return not all(is_weak) and not all(is_minor)
@@ -161,10 +164,9 @@ def _of_biases(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[Acc
 
 def _of_samples(answer: Answer) -> list[AcceptedEffect]:
     out = []
-    for one in answer.seen:
-        said = one.evidence
+    for key, said in answer.seen.items():
         parameters = said.parameters if said.restate is None else said.restate(answer.numbers.context)
-        out.append(effect_record(one.effect, parameters, said.statement, said.p_value, one.gain, said.held_out))
+        out.append(effect_record(by_id()[key], parameters, said.statement, said.p_value, said.strength, said.held_out))
     return out
 
 

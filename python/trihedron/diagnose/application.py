@@ -13,6 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.candidates import N_ROUNDS
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import by_id
 from trihedron.diagnose.effects.contract import Variant
@@ -20,9 +21,6 @@ from trihedron.diagnose.session.solve import Fit
 from trihedron.errors import InputError
 from trihedron.records import Recording
 from trihedron.records.words import words
-
-N_ITERATIONS = 2
-"""Fixed-point iterations: effects are about 10⁻³ of the motion, so two leave an error of their square."""
 
 CHANNELS = {"temperature_degc": "temperature", "supply_v": "supply voltage"}
 
@@ -96,7 +94,7 @@ def compensate(
     state = SimpleNamespace(accel_S=S_f, gyro_S=S_w)
     left_out: dict[str, str] = {}
     force, rate = read_f, read_w
-    for _ in range(N_ITERATIONS):
+    for _ in range(N_ROUNDS):
         core = SimpleNamespace(path=lambda moved=(rate, force, None): moved)
         context = SampleContext(cast(Fit, SimpleNamespace(core=core, state=state, obs=obs)), reference=references)
         force, rate = read_f, read_w

@@ -19,17 +19,16 @@ from trihedron.probability import STRONG_SCORE
 from trihedron.quantiles import medians
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, PART_NOISE, Bounds
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
 from trihedron.threads import side_by_side
 
 DRIFT_CORNER_S = 2.0 * NOISE_CORNER_S
 """Corner time of a walk that twenty poses in some minutes do not show: half an error of a pose. A smooth drift of 12
 errors is likely as a walk with the corner time of the noisiest parts; that it exceeds 1/f noise its size shows:"""
-LEAST_TIMES = 2.0
-"""Rms of a drifting bias over the poses, in standard errors of a pose mean, above which the drift is named: 1/f noise
-drifts too, up to 1.63 with 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
-FLICKER_WITHIN = 1.5
-"""Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small."""
+FLICKER_WITHIN = 2.0
+"""Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small; and rms of a
+drifting bias over the poses, in standard errors of a pose mean, above which the drift is named: 1/f noise drifts too,
+up to 1.63 with 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +49,7 @@ class BiasStrength:
     price: float
     """Selection penalty of a catalogue effect, in twice a log-likelihood; it applies to a named process too."""
     is_large: bool
-    """Whether a drift exceeds that of 1/f noise (``LEAST_TIMES``)."""
+    """Whether a drift exceeds that of 1/f noise (``FLICKER_WITHIN``)."""
     rivals: tuple[str, ...] = ()
     """The sensor's other process, where that explains as much."""
 
@@ -93,7 +92,7 @@ def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds
     """Bounds of the noise strengths that the part's own noise explains; the processes ``but`` stay unbounded."""
     free = {(one.sensor, one.walks) for one in but}
     every = {(s, walks) for s in range(2) for walks in (True, False)}
-    return _bounded(obs, (*ANYTHING[:2], PART_NOISE[2]), every - free)
+    return _bounded(obs, (*ANYTHING[:2], (1.0, 1.0)), every - free)
 
 
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
@@ -121,7 +120,7 @@ def _strength(model: Hypothesis, effect: BiasProcess, without: Hypothesis, *need
     """One process; ``needless`` is the hypothesis without the sensor's other one, where that is as likely."""
     gain, alone = _gain(model, without), next(iter(needless), model)
     size, std = _size(alone, effect)
-    is_large = not effect.walks or _times_error(model, effect.sensor) > LEAST_TIMES
+    is_large = not effect.walks or _times_error(model, effect.sensor) > FLICKER_WITHIN
     parameters, statement = effect.of_strength(size, std)
     # Noise strengths are in every hypothesis, so no selection penalty applies. Each axis beyond the first is one more
     # fitted strength, with a relative uncertainty of 1/sqrt(2n), and has the penalty of a parameter.

@@ -8,27 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
-from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.effects.contract import PRIOR_SCALES, Effect, Variant
 from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import STRONG_SCORE, chdtrc
 from trihedron.threads import side_by_side
 
-WORTH_FITTING, OF_THE_BEST = 20.0, 0.5
-"""Rivals are fitted in full within this difference of scores, one linear step from the fit, or from this share of the
-best score on: one step predicts a large effect poorly."""
-PRIOR_SCALES = (1.0, 0.3, 0.1)
-"""Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
-RESCALED = (10.0, 3.0, 0.3)
-"""Factors on the prior width at which candidates are evaluated again."""
+OF_THE_BEST = 0.5
+"""Rivals are fitted in full from this share of the best score on, one linear step from the fit, or where they explain
+as much: one step predicts a large effect poorly."""
 N_LEADERS = 3
-"""Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted, and rivals of
-those that are fitted in full."""
+"""Effects of each screening at fixed noise strengths that are evaluated with noise strengths refitted, shapes of each
+(as many with a plausible and an implausible size, with a shape parameter and without), rivals fitted in full."""
 AT_ONCE = 16
 """Effects whose columns are computed together."""
-SHAPES_KEPT = 2
-"""Shapes kept per effect, counted separately for those with a plausible and those with an implausible size, and for
-those with a shape parameter and those without."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,22 +46,21 @@ def wald_p(value: FloatArray, covariance: FloatArray) -> float:
 
 def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried], dict[str, str]]:
     """Every effect added to the hypothesis at its noise strengths; and the reasons why others do not apply."""
-    offered, missing = offered_beside(model, effects, ())
-    price = price_of_choice(model, effects)
-    terms = [term for effect in offered for term in terms_of(model, effect, price)]
+    price, reasons = price_of_choice(model, effects), {one.id: one.unavailable(model.context) for one in effects}
+    terms = [term for effect in offered_beside(model, effects, ()) for term in terms_of(model, effect, price)]
     asked = model.at_its_strengths(terms, PRIOR_SCALES)
+    missing = {key: reason for key, reason in reasons.items() if reason is not None}
     return _best_of_each(terms, asked, model.log_evidence, is_stated=True), missing
 
 
 def candidates_beside(
     model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str], least: float = -STRONG_SCORE
-) -> tuple[list[Tried], dict[str, str]]:
-    """Candidates to add to a hypothesis, best first, that score more than ``least`` at some strengths; and the reasons
-    why others do not apply."""
-    offered, missing = offered_beside(model, effects, exclude)
+) -> list[Tried]:
+    """Candidates to add to a hypothesis, best first, that score more than ``least`` at some strengths."""
+    offered = offered_beside(model, effects, exclude)
     leading = _leaders(model, offered, price_of_choice(model, effects), least)
     if not leading:
-        return [], missing
+        return []
     asked = model.with_added(leading)
     # Columns that depend on the size (a delay) are computed again for the fitted size.
     sized = {
@@ -80,9 +72,10 @@ def candidates_beside(
         leading[k], asked[k] = sized[k], one
     plain = model.plain([one.strengths for one in asked])
     # The screening at fixed noise strengths may have chosen a prior width that is too small or too large.
-    terms = [term.scaled(by) for by in (1.0, *RESCALED) for term in leading]
-    under = [one.with_prior(t.sizes, t.sizes * s) for s in RESCALED for t, one in zip(leading, asked, strict=True)]
-    return _best_of_each(terms, [*asked, *under], plain), missing
+    other = [by for scale in PRIOR_SCALES[1:] for by in (scale, 1.0 / scale)]
+    terms = [term.scaled(by) for by in (1.0, *other) for term in leading]
+    under = [one.with_prior(t.sizes, t.sizes * by) for by in other for t, one in zip(leading, asked, strict=True)]
+    return _best_of_each(terms, [*asked, *under], plain)
 
 
 def _best_of_each(
@@ -103,14 +96,10 @@ def _best_of_each(
     return sorted((one for *_, one in best.values()), key=lambda one: -one.score)
 
 
-def offered_beside(
-    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str]
-) -> tuple[list[Effect], dict[str, str]]:
-    """The effects that apply and are not included; and the reasons why others do not apply."""
+def offered_beside(model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str]) -> list[Effect]:
+    """The effects that apply and are not included."""
     held = {t.effect.id for t in model.terms if not t.effect.is_local} | set(exclude)
-    reasons = {effect.id: effect.unavailable(model.context) for effect in effects}
-    missing = {key: reason for key, reason in reasons.items() if reason is not None and key not in held}
-    return [one for one in effects if one.id not in held and reasons[one.id] is None], missing
+    return [one for one in effects if one.id not in held and one.unavailable(model.context) is None]
 
 
 def terms_of(model: Hypothesis, effect: Effect, price: float) -> list[Term]:
@@ -152,7 +141,7 @@ def _ahead(seen: list[tuple[Term, bool, FloatArray]]) -> list[tuple[Term, bool, 
         for k in sorted(range(len(seen)), key=lambda k: -best[k]):
             term, can_be, _ = seen[k]
             shape = term.effect.id, can_be, bool(term.variant.shape)
-            if count[shape] < SHAPES_KEPT and (shape[0] in led or len(led) < N_LEADERS):
+            if count[shape] < N_LEADERS and (shape[0] in led or len(led) < N_LEADERS):
                 count[shape] += 1
                 led.add(shape[0])
                 kept[k] = seen[k]
@@ -169,7 +158,7 @@ def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
 def worth_fitting(tried: Sequence[Tried]) -> list[Tried]:
     """Those of some candidates, best first, that are near the best."""
     first = tried[0].score if tried else 0.0
-    return [one for one in tried if one.score > min(first - WORTH_FITTING, OF_THE_BEST * first)]
+    return [one for one in tried if one.score > min(first - STRONG_SCORE, OF_THE_BEST * first)]
 
 
 def with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
@@ -195,18 +184,17 @@ def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
 
 SHAPE_STEPS = 0.6 * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Steps of the logarithm of a shape parameter about the grid's best, to which a parabola is fitted."""
-N_RESHAPED = 2
-"""Iterations of size and shape: the second changes them by a tenth of what the first does."""
+N_ROUNDS = 2
+"""Fixed-point iterations of size, shape and columns: effects are about 10⁻³ of the motion, so two leave an error of
+their square."""
 GRID_STEP = math.log(2.5)
 """Usual distance between two values of a grid, as a logarithm."""
-STEP_LOG = 0.02
-"""Half-step of the numerical derivative by the logarithm of a shape parameter."""
 
 
 def as_fits_best(model: Hypothesis, tried: Tried) -> Term:
     """A candidate with its columns computed for its fitted size, at its shape of maximum evidence."""
     term, asked = tried.term, tried.asked
-    for _ in range(N_RESHAPED):
+    for _ in range(N_ROUNDS):
         made = term.effect.rescaled(model.context, term.variant, asked.value)
         if made is None:
             break
@@ -223,7 +211,7 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
     if term.effect.reshaped(model.context, term.variant, value) is None:
         return term
     spread, sigma = 1.0, np.inf
-    for _ in range(N_RESHAPED):
+    for _ in range(N_ROUNDS):
         steps = spread * SHAPE_STEPS
         made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(step))) for step in steps]
         asked = model.with_added([replace(term, variant=v) for v in made if v is not None])
@@ -248,7 +236,7 @@ def renewed(model: Hypothesis) -> Hypothesis:
     """The hypothesis with the columns of its own motion, for effects of the true motion: those of the search were
     computed from readings that contained the effect, and with the S that was fitted without it."""
     if any(term.effect.is_of_true_motion for term in model.terms):
-        for _ in range(N_RESHAPED):
+        for _ in range(N_ROUNDS):
             model = again(model, [_renewed(model, term) for term in model.terms])
     return model
 
@@ -276,7 +264,9 @@ def _by_shape(model: Hypothesis, k: int) -> Term | None:
     if term.variant.shape_sigma <= 0.0 or len(term.variant.shape) != 1:
         return None
     ((_, (value, _)),) = term.variant.shape.items()
-    made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(s))) for s in (-STEP_LOG, STEP_LOG)]
+    # The difference quotient over the standard error of its logarithm, as far as the shape was tried.
+    step = min(term.variant.shape_sigma / abs(value), float(SHAPE_STEPS[-1]))
+    made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(s))) for s in (-step, step)]
     if made[0] is None or made[1] is None:
         return None
     size, _ = model.value(k)
@@ -284,7 +274,7 @@ def _by_shape(model: Hypothesis, k: int) -> Term | None:
 
     def slope(name: str) -> FloatArray | None:
         a, b = getattr(low, name), getattr(high, name)
-        return None if a is None else ((b - a) @ size / (2.0 * STEP_LOG))[:, :, None]
+        return None if a is None else ((b - a) @ size / (2.0 * step))[:, :, None]
 
     columns = Distortion(slope("force"), slope("rate"))
     return Term(term.effect, Variant(columns, ("shape",), ("1",), label="shape"), np.ones(1))

@@ -13,7 +13,6 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.slope import slope_of
 from trihedron.sensor_model import axis_scales
-from trihedron.session.noise import QUIET
 
 VIBRATION_WINDOW_S = 0.25
 """Window of the parabola that follows the motion while vibration is measured in a move."""
@@ -239,7 +238,8 @@ class Context:
 
     @cached_property
     def vibration_power(self) -> FloatArray:
-        """(points, 3) vibration power above the quiet floor, SI²: variance in a pose, running mean square in a move.
+        """(points, 3) vibration power above that of the quietest pose, SI²: variance in a pose, running mean square in
+        a move.
 
         In moves the slow motion is removed by a local parabola. The part of the vibration that the parabola removes
         too is restored by the ratio found in the vibrating poses.
@@ -257,7 +257,7 @@ class Context:
 
         spans = obs.segments.spans.tolist()
         inside = np.array([rough(obs.raw_force[start:stop] @ S.T).mean(axis=0) for start, stop in spans])
-        quiet, floor = (np.quantile(power, QUIET, axis=0) for power in (inside, poses))
+        quiet, floor = (power.min(axis=0) for power in (inside, poses))
         passed = np.clip((inside - quiet).sum() / max(float((poses - floor).sum()), TINY), 0.1, 1.0)
         in_moves = [(rough(self.force[where]) - quiet) / passed for where in self.moves]
         return np.asarray(np.maximum(np.concatenate([poses - floor, *in_moves]), 0.0))

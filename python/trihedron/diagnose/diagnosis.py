@@ -2,30 +2,30 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from scipy.special import ndtr
 
+from trihedron.arrays import rms_of
 from trihedron.defaults import FALSE_ALARM, check_alpha
 from trihedron.diagnose.accepted import Answer, accepted_effects, candidates, held_out_stages
 from trihedron.diagnose.bias_strengths import bias_strengths, noise_bounds
 from trihedron.diagnose.candidates import renewed, with_shapes
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import Evidence
+from trihedron.diagnose.effects.contract import GYRO, SENSORS, Evidence
 from trihedron.diagnose.effects.timing_jitter import common_time_variance
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import noise_relations, records
 from trihedron.diagnose.relations.search import Related
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after
-from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, hidden_biases, judge_rows
+from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, judge_rows
 from trihedron.diagnose.residuals.within_poses import judge_within_poses, within_limit
 from trihedron.diagnose.sample_evidence import look
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import Observations, observe
-from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import linear_model, nominal, prior_of, start_state, starts_nominal
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import InputError
@@ -118,34 +118,30 @@ def _diagnosed(
 
 def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
     """White noise density, noise corner time and bias changes of both sensors."""
-    corners, density = model.strengths[0], model.context.noise_density
-    accel, gyro = hidden_biases(model.fitted)
-    return MappingProxyType(
-        {
-            "accelerometer_density": density[0].tolist(),
-            "accelerometer_unit": "m/s^2/sqrt(Hz)",
-            "accelerometer_corner_s": corners[0],
-            "accelerometer_bias": asdict(accel),
-            "gyroscope_density": None if gyro is None else density[1].tolist(),
-            "gyroscope_unit": "rad/s/sqrt(Hz)",
-            "gyroscope_corner_s": corners[1],
-            "gyroscope_bias": None if gyro is None else asdict(gyro),
-        }
-    )
+    obs, state, out = model.obs, model.fitted.state, dict[str, object]()
+    of_rate = None if obs.pose_rate_sigma is None else obs.pose_rate_sigma * model.context.si_per_raw(GYRO)
+    errors = obs.norm_sigma(state.up @ state.accel_S), of_rate
+    for sensor, (name, error) in enumerate(zip(("accelerometer", "gyroscope"), errors, strict=True)):
+        bias = model.fitted.bias(sensor)
+        changes = rms_of(bias - bias.mean(axis=0))
+        out[f"{name}_density"] = None if error is None else model.context.noise_density[sensor].tolist()
+        out[f"{name}_unit"] = f"{SENSORS[sensor].unit}/sqrt(Hz)"
+        out[f"{name}_corner_s"] = model.strengths[0][sensor]
+        out[f"{name}_bias"] = None if error is None else {"rms": changes, "noise": float(np.median(error))}
+    return MappingProxyType(out)
 
 
 def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: float, notify: Progress) -> Answer:
     notify(0.05, "fitting the session")
-    predicted, settles = _on_support(tune_noise(obs, start, prior), start, alpha)
-    context = Context(predicted)
-    notify(0.2, "looking at the samples")
-    observed = look(context, alpha)
     # The same bounds of noise as beside the effects: what these do not explain is not cleared by them.
-    plain = hypothesis(predicted.obs, predicted.state, prior, within=noise_bounds(predicted.obs))
+    plain, settles = _on_support(hypothesis(obs, start, prior, within=noise_bounds(obs)), alpha)
+    context = plain.context
+    notify(0.2, "looking at the samples")
+    observed = look(plain, alpha)
     of_samples = judge_within_poses(context.obs, alpha), _judge_timing(context, alpha, observed.found.values())
     domains = _disagreeing((*judge_rows(plain.fitted, alpha), *of_samples), settles)
     notify(0.3, "letting effects compete")
-    bare = hypothesis(observed.fitted.obs, observed.fitted.state, prior)
+    bare = hypothesis(observed.model.obs, observed.model.fitted.state, prior)
     found = search(bare, alpha)
     notify(0.8, "asking what biases do by themselves")
     # Bias processes are tested beside the relations: a bias that follows a variable does not drift at random.
@@ -165,18 +161,19 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
 
 
-def _on_support(predicted: Fit, start: SessionState, alpha: float) -> tuple[Fit, dict[Domain, float]]:
-    """The fit, with the motion of a support that yields (eq. 8.7f); and the domains in which a bias settles inside the
-    poses, with p-values: the noise of their means had absorbed it."""
-    obs, state = predicted.obs, predicted.state
+def _on_support(plain: Hypothesis, alpha: float) -> tuple[Hypothesis, dict[Domain, float]]:
+    """The session, with the motion of a support that yields (eq. 8.7f); and the domains in which a bias settles inside
+    the poses, with p-values: the noise of their means had absorbed it."""
+    obs, state = plain.obs, plain.fitted.state
     biases = [one for one in obs.segments.findings if one.code == "bias-settling"]
     shown: dict[Domain, float] = {"within-static": biases[0].numbers["p_value"]} if biases else {}
     support = obs.support_seen(state)
     if support is not None and support.of_bias >= threshold(alpha):
         shown["static-gyro"] = math.exp(-0.5 * support.of_bias)
     elif support is not None and support.yields:
-        predicted = tune_noise(obs.on(support, state.gyro_S), start, predicted.prior)
-    return predicted, shown
+        settled = obs.on(support, state.gyro_S)
+        plain = hypothesis(settled, state, plain.fitted.prior, within=noise_bounds(settled))
+    return plain, shown
 
 
 def _disagreeing(domains: tuple[DomainTest, ...], p_values: Mapping[Domain, float]) -> tuple[DomainTest, ...]:
@@ -215,7 +212,7 @@ POSE_DOMAINS = ("static-accel", "moves", "dynamics")
 
 def _explained(answer: Answer, of_samples: Sequence[DomainTest]) -> list[DomainTest]:
     """The domains of the samples, which agree once an accepted effect explains their disagreement."""
-    explained = {one.evidence.domain for one in answer.seen}
+    explained = {one.domain for one in answer.seen.values()}
     explained |= {domain for one in catalogue() if one.id in answer.ids for domain in one.accounts_for}
     return [replace(d, disagrees=False) if d.domain in explained else d for d in of_samples]
 

@@ -11,9 +11,9 @@ import numpy as np
 from trihedron.arrays import TINY, FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, ROW_UNITS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Distortion, Fit, Prediction, predict_held_out, solved, stacked
+from trihedron.diagnose.session.solve import Distortion, Fit, solved, stacked
 from trihedron.records.domains import HeldOut
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState, contiguous
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
@@ -120,16 +120,11 @@ class Hypothesis:
         return Context(self.fitted)
 
     @cached_property
-    def prediction(self) -> Prediction:
-        """Blocks of poses and moves, each predicted from all others."""
-        return predict_held_out(self.fitted)
-
-    @cached_property
     def held_out(self) -> dict[int, tuple[float, float]]:
         """Held-out rms [SI] and chi-square per row of every domain that has rows."""
-        prediction = self.prediction
-        rms = physical_rms(self.fitted, prediction.innovation)
-        return {d: (rms[d], float(prediction.per_row[d])) for d in rms if prediction.n_rows[d] >= LEAST_DOF}
+        chi2, n_rows, innovation = self.fitted.held_out
+        rms = physical_rms(self.fitted, innovation)
+        return {d: (rms[d], float(chi2[d] / n_rows[d])) for d in rms if n_rows[d] > 0.0}
 
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
@@ -206,7 +201,7 @@ def hypothesis(
     """The session fitted with some effects, alternating with its noise strengths of maximum evidence."""
     distortion = stacked([term.distortion for term in terms])
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
-    fitted = solved(obs, start, prior, distortion, strengths, within, sizes, is_scatter_free=True)
+    fitted = solved(obs, start, prior, distortion, strengths, within, sizes)
     return Hypothesis(tuple(terms), fitted, within)
 
 

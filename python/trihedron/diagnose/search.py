@@ -6,7 +6,7 @@ the shapes and effects tried. It is accepted above the threshold that the false-
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,6 @@ import numpy as np
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
 from trihedron.diagnose.candidates import (
     N_LEADERS,
-    WORTH_FITTING,
     Tried,
     all_beside,
     as_fits_best,
@@ -97,12 +96,12 @@ class _Search:
         """The hypothesis with effects added one at a time until none scores above the threshold."""
         larger: Hypothesis | None = model
         while larger is not None:
-            model, larger = larger, self._with_one_more(larger, ())
+            model, larger = larger, self._with_one_more(larger)
         return model
 
-    def _with_one_more(self, model: Hypothesis, exclude: Collection[str]) -> Hypothesis | None:
+    def _with_one_more(self, model: Hypothesis) -> Hypothesis | None:
         """The hypothesis with the best effect that lowers a held-out rms, or none."""
-        tried, _ = candidates_beside(model, self.effects, {*exclude, *self.dropped})
+        tried = candidates_beside(model, self.effects, self.dropped)
         standing = [one for one in tried if one.score > self.limit]
         while standing:
             larger, chosen = with_best(model, standing)
@@ -118,8 +117,9 @@ class _Search:
         With such an effect the bias process is no stronger than the part's own noise explains.
         """
         model = found.model
-        tried = [one for one in found.tried.values() if not isinstance(one.term.effect, BiasProcess)]
-        tried = [one for one in tried if one.score > -WORTH_FITTING]
+        near = -STRONG_SCORE - price_of_choice(model, self.effects)
+        tried = [one for one in found.tried.values() if one.score > near]
+        tried = [one for one in tried if not isinstance(one.term.effect, BiasProcess)]
         for process in bias_strengths(model, self.alpha)[0] if tried else ():
             standing = explain_as_much(process, model, tried)
             larger, chosen = with_best(model, standing) if standing else (model, None)
@@ -145,7 +145,7 @@ class _Search:
         # Results with noise strengths refitted replace those at the strengths of the answer, of an effect the best.
         # Rivals of a bias process, which pays the same price, are those down to ``STRONG_SCORE`` below it.
         least = -STRONG_SCORE - price_of_choice(model, self.effects)
-        tried = [*reversed(stated), *reversed(candidates_beside(model, self.effects, (), least)[0])]
+        tried = [*reversed(stated), *reversed(candidates_beside(model, self.effects, (), least))]
         held = {term.effect.id for term in model.terms}
         return Found(
             model, beside, {one.term.effect.id: one for one in tried},
@@ -177,7 +177,7 @@ class _Search:
         for k, fewer in enumerate(without):
             term = model.terms[k]
             scored = [(2.0 * model.log_evidence - term.cost, model, term)]
-            tried, _ = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms} - {term.effect.id})
+            tried = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms} - {term.effect.id})
             rivals_of_it = [one for one in worth_fitting(tried) if one.term.effect.id != term.effect.id]
             for other in rivals_of_it[:N_LEADERS]:
                 fitted = as_fits_best(fewer, other)

@@ -12,17 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.candidates import N_LEADERS, PRIOR_SCALES, offered_beside, price_of_choice, terms_of
+from trihedron.diagnose.candidates import N_LEADERS, offered_beside, price_of_choice, terms_of
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.effects.contract import DirectEffect, Effect
+from trihedron.diagnose.effects.contract import PRIOR_SCALES, DirectEffect, Effect
 from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
 from trihedron.diagnose.search import threshold
 from trihedron.probability import chdtrc
 from trihedron.records.diagnosis import EffectParameter, SharedCandidate, SharedEffect
-
-KNOWN = 1e-6
-"""Relative precision, to that of the best direction, below which a recording does not determine a direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,21 +44,6 @@ class Information:
         odds = 0.5 * (np.linalg.slogdet(posterior)[1] - np.linalg.slogdet(prior)[1])
         return cls(gain - 0.5 * float(slope @ np.linalg.solve(posterior, slope)) + float(odds), slope, precision)
 
-    @property
-    def inverse(self) -> FloatArray:
-        """Inverse of the precision over the directions that this recording determines."""
-        return np.asarray(np.linalg.pinv(self.precision, rcond=KNOWN, hermitian=True))
-
-    @property
-    def rank(self) -> int:
-        """Number of these directions."""
-        return round(float(np.trace(self.inverse @ self.precision)))
-
-    @property
-    def peak(self) -> float:
-        """``slope·precision⁻¹·slope`` over these directions."""
-        return float(self.slope @ self.inverse @ self.slope)
-
 
 def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatArray, FloatArray]:
     """Log-evidence gained by one common ``q`` with prior standard deviation ``scale``; ``q`` and its covariance."""
@@ -75,9 +57,17 @@ def together(parts: Sequence[Information], scale: float) -> tuple[float, FloatAr
 
 def agreement(parts: Sequence[Information]) -> float:
     """p-value of the differences between the recordings' sizes of one effect (χ², no prior)."""
-    whole = Information(0.0, np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0))
-    dof = sum(one.rank for one in parts) - whole.rank
-    return chdtrc(dof, max(sum(one.peak for one in parts) - whole.peak, 0.0)) if dof > 0 else 1.0
+    slope, precision = np.sum([p.slope for p in parts], axis=0), np.sum([p.precision for p in parts], axis=0)
+    every = np.array([_determined(one.slope, one.precision) for one in parts]).sum(axis=0)
+    dof, chi2 = every - _determined(slope, precision)
+    return chdtrc(dof, max(chi2, 0.0)) if dof > 0 else 1.0
+
+
+def _determined(slope: FloatArray, precision: FloatArray) -> tuple[float, float]:
+    """Number of the directions that a likelihood determines, beyond rounding, and its square along them."""
+    values, vectors = np.linalg.eigh(precision)
+    known = values > np.sqrt(np.finfo(np.float64).eps) * values[-1]
+    return float(known.sum()), float(((slope @ vectors[:, known]) ** 2 / values[known]).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +152,7 @@ def _tried(models: Sequence[Hypothesis], exclude: Collection[str]) -> list[_Join
     sought = [one for one in catalogue() if may_be_shared(one)]
     found = []
     for model in models:
-        offered, price = offered_beside(model, sought, exclude)[0], price_of_choice(model, catalogue())
+        offered, price = offered_beside(model, sought, exclude), price_of_choice(model, catalogue())
         found.append({_key(t): t for effect in offered for t in terms_of(model, effect, price)})
     common = [key for key in found[0] if all(key in one for one in found)]
     if not common:

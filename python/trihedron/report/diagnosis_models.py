@@ -57,8 +57,7 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             facts.append((f"{name} noise", words))
         changes = diagnosis.noise.get(f"{name}_bias")
         if changes:
-            bound = ", at its upper bound" if changes["is_at_edge"] else ""
-            words = f"changes {size_in_words(changes['rms'], si)} RMS between poses (random walk{bound})"
+            words = f"changes {size_in_words(changes['rms'], si)} RMS between poses (random walk)"
             words += f"; uncertainty of a pose's mean {size_in_words(changes['noise'], si)}"
             facts.append((f"{name} bias", words))
     blocks.append(Facts(tuple(facts)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.session.noise import START_STRENGTHS, SessionNoise, Strengths
+from trihedron.session.noise import SessionNoise
 from trihedron.transforms import directions_of
 
 LOWER = np.tril_indices(3)
@@ -37,10 +37,8 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class SessionState:
-    """State of the session. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per pose.
-
-    Biases are in SI; ``strengths`` are the noise strengths of the session.
-    """
+    """State of the session. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per pose,
+    biases in SI."""
 
     gravity: float
     accel_S: FloatArray
@@ -50,7 +48,6 @@ class SessionState:
     gyro_bias: FloatArray
     accel_bias: FloatArray
     effect: FloatArray
-    strengths: Strengths = START_STRENGTHS
 
 
 def contiguous(values: FloatArray | None) -> FloatArray | None:
@@ -93,18 +90,13 @@ class SessionReadings(SessionNoise):
         moves: _core.SessionMoves,
         timing_s: tuple[float, float],
         prior: Prior | None,
-        *,
-        is_scatter_free: bool = True,
     ) -> _core.SessionModel:
-        """The Rust model; with ``is_scatter_free`` biases may differ from pose to pose by what the evidence shows.
-
-        ``timing_s``: scatter of the sampling instants, and the sample interval.
-        """
+        """The Rust model; ``timing_s``: scatter of the sampling instants, and the sample interval."""
         unit = self.scatter_unit()
         return _core.SessionModel(
             gravity=(gravity_m_s2, self.earth_up_rad_s), poses=self.core_poses(), moves=moves, noise=timing_s,
             prior=None if prior is None else (prior.mean, prior.covariance, prior.is_weak),
-            scatter=(unit, self.force_scatter / float(unit[0, 0])) if is_scatter_free else None,
+            scatter=(unit, self.force_scatter / float(unit[0, 0])),
         )  # fmt: skip
 
     def at_means(
@@ -142,5 +134,5 @@ def state_of(core: _core.SessionFit, gravity_m_s2: float) -> SessionState:
     return SessionState(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.pose_rate_bias @ gyro_S.T, accel_bias=core.pose_force_bias @ accel_S.T,
-        effect=np.asarray(core.effect), strengths=core.strengths,
+        effect=np.asarray(core.effect),
     )  # fmt: skip

@@ -20,7 +20,7 @@ CHATTER = 9
 """Length of the running median, in readings, that removes toggling between neighbouring codes."""
 STEADY = IN_STEP, CHATTER
 LEAST_WHITE = 1e-2
-"""Least white noise of an undithered axis, as a share of the rounding variance: its readings show none."""
+"""Least share of a variance that is left once rounding is taken out of it: undithered readings show none."""
 
 
 def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:

@@ -7,13 +7,10 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, Effect, Variant, on_axes
+from trihedron.session.drift import SLOW_S
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 """Half-widths tried, a twentieth to half of g, then refined; above g the play never reverses in poses."""
-PLAY_M_S2, CREEP = 0.02, 0.005
-"""Prior sigma: 2 mg of play; half a percent of a change of force that settles slowly."""
-CREEP_TIMES_S = (5.0, 20.0, 60.0)
-"""Time constants tried, s, the length of one pose by hand to ten, then refined; that seen inside poses too."""
 
 
 class AccelHysteresis(Effect):
@@ -21,12 +18,9 @@ class AccelHysteresis(Effect):
 
     id = "accel-hysteresis"
 
-    def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
-        return np.full(3, PLAY_M_S2 if variant.label == "play" else CREEP)
-
     def variants(self, context: Context) -> list[Variant]:
         seen = [one.numbers["tau_s"] for one in context.obs.segments.findings if one.code == "bias-settling"]
-        creeps = [_creep(context, tau) for tau in (*CREEP_TIMES_S, *seen)]
+        creeps = [_creep(context, tau) for tau in (*SLOW_S, *seen)]
         return [_play(context, width) for width in PLAY_WIDTHS_M_S2] + creeps
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:

@@ -9,9 +9,6 @@ from trihedron.probability import SURE
 from trihedron.records.domains import Where
 from trihedron.sensor_model import order_and_reversed
 
-CERTAIN = 1e6
-"""Gain that ranks it before every effect: with a mirrored axis nothing else can be judged."""
-
 
 class AxisHandedness(DirectEffect):
     """The gyro's axes, as documented, have the other handedness than the accelerometer's as documented."""
@@ -54,4 +51,5 @@ class AxisHandedness(DirectEffect):
             )  # fmt: skip
         parameters = per_axis_parameters("gyro_sign", np.sign(largest), np.zeros(3), "1")
         where = Where(tuple(f"g{axis}" for axis in reversed_axes))
-        return Evidence(0.0, CERTAIN, parameters, statement, "moves", where)
+        gain = float(((largest / sigma[main, range(3)]) ** 2).sum())
+        return Evidence(0.0, gain, parameters, statement, "moves", where)

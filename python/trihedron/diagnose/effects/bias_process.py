@@ -12,6 +12,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import (
     ACCELEROMETER,
     GYRO,
+    PRIOR_SCALES,
     SENSORS,
     Effect,
     Variant,
@@ -25,14 +26,9 @@ from trihedron.session.drift import TYPICAL, WARM_UP_FRACTIONS
 from trihedron.session.noise import FEWEST_POSES
 from trihedron.session.rounding import UNIFORM
 
-MOST_M_S2, MOST_RAD_S = 0.6, 0.09
-"""Largest bias change of a part while it warms up (0.06 g, 5 °/s; chambers of 90 K show as much); a larger one
-indicates a disturbed pose."""
 STEP, STEP_TIME = "step", "step_time"
-STEPS_KEPT = 4
-"""Places of a step that are fitted."""
-SEEN = 1e-3
-"""Least length of a direction of the step in the poses, beside S and b, that counts as seen."""
+N_STEPS = 8
+"""Places of a step that are tried; of those spread evenly, one half a place away still has most of its evidence."""
 COSINES = (1, 2, 3, 4)
 """Half periods of a slow curve in the session: as many bends as a fit of S and b leaves to twenty poses."""
 
@@ -91,13 +87,12 @@ class BiasDrift(BiasProcess):
     def _steps(self, context: Context) -> list[Variant]:
         """Steps at the likeliest places between poses, chosen by the poses alone among all."""
         times, h = context.time_s[: context.obs.n_poses], context.obs.n_poses
-        gains = _gains_of_steps(context, self.shows_as)
         out = []
-        for k in np.argsort(-gains)[:STEPS_KEPT]:
+        for k in np.argsort(_left_by_steps(context, self.shows_as))[:N_STEPS]:
             at_s = float(0.5 * (times[k] + times[k + 1]))
             made = self._along(context, _after(context, at_s), (STEP,), STEP, {STEP_TIME: (at_s, "s")})
             sigma = float(times[k + 1] - times[k]) * np.sqrt(UNIFORM)
-            out.append(replace(made, shape_sigma=sigma, n_places=(h - 1) / STEPS_KEPT))
+            out.append(replace(made, shape_sigma=sigma, n_places=max((h - 1) / N_STEPS, 1.0)))
         return out
 
     def _along(
@@ -119,41 +114,40 @@ class BiasDrift(BiasProcess):
         return self._warm_up(context, value) if variant.label == "warm-up" else None
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        """Whether the peak-to-peak range of the curve is at most that of a part's bias."""
-        for side, most in ((variant.distortion.force, MOST_M_S2), (variant.distortion.rate, MOST_RAD_S)):
-            if side is not None:
-                # Contiguous per axis: ptp over rows of three takes ten times as long.
-                drift = np.ascontiguousarray((side.reshape(-1, len(value)) @ value).reshape(len(side), 3).T)
-                if float(np.ptp(drift, axis=1).max(initial=0.0)) > most:
-                    return False
-        return True
+        """Whether the peak-to-peak range of the curve is that of a part's bias, within two standard deviations of parts
+        that differ tenfold (0.1 g, 5 °/s; chambers of 90 K show as much); a larger one indicates a disturbed pose."""
+        side = (variant.distortion.force, variant.distortion.rate)[self.sensor]
+        if side is None:
+            return True
+        # Contiguous per axis: ptp over rows of three takes ten times as long.
+        drift = np.ascontiguousarray((side.reshape(-1, len(value)) @ value).reshape(len(side), 3).T)
+        return float(np.ptp(drift, axis=1).max(initial=0.0)) < 2.0 / PRIOR_SCALES[-1] * self.typical
 
     def of_strength(
         self, size: FloatArray, std: FloatArray, *, is_counts: bool = False
     ) -> tuple[tuple[EffectParameter, ...], Words]:
         """Parameters and sentence of a random walk; readings of a log of one orientation may be counts of unknown
         scale."""
-        said = self.reported("walk-counts", range=size) if is_counts else self.reported("walk", range=size)
+        said = self.reported("walk", range=size, is_counts=is_counts)
         return per_axis_parameters("range", size, std, self.unit), said
 
     def of_curve(
         self, variant: Variant, size: FloatArray, std: FloatArray, *, is_counts: bool
     ) -> tuple[tuple[EffectParameter, ...], Words]:
         """The same of a step or a smooth curve in such a log."""
-        parameters = per_axis_parameters("range", size, std, self.unit)
-        if variant.label != STEP:
-            said = self.reported("static-counts", range=size) if is_counts else self.reported("static", range=size)
-            return parameters, said
-        at_s, _ = variant.shape[STEP_TIME]
-        if is_counts:
-            return parameters, self.reported("step-counts", range=size, step_time=at_s)
-        return parameters, self.reported("step", range=size, step_time=at_s)
+        if variant.label == STEP:
+            at_s, _ = variant.shape[STEP_TIME]
+            said = self.reported("step", range=size, step_time=at_s, is_counts=is_counts)
+        else:
+            said = self.reported("static", range=size, is_counts=is_counts)
+        return per_axis_parameters("range", size, std, self.unit), said
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
         values = {p.name: p.value for p in parameters}
         if STEP_TIME not in values:
             return super().statement(parameters)
-        return self.reported("step", range=[values[name] for name in per_axis(STEP)], step_time=values[STEP_TIME])
+        step = [values[name] for name in per_axis(STEP)]
+        return self.reported("step", range=step, step_time=values[STEP_TIME], is_counts=False)
 
 
 class AccelBiasDrift(BiasDrift):
@@ -172,20 +166,18 @@ class GyroBiasDrift(BiasDrift):
     typical = TYPICAL[1]
 
 
-def _gains_of_steps(context: Context, sensor: int) -> FloatArray:
-    """(poses - 1,) sum of squares that a step of the bias behind each pose takes off the means of the poses, beside S
+def _left_by_steps(context: Context, sensor: int) -> FloatArray:
+    """(poses - 1,) sum of squares that a step of the bias behind each pose leaves in the means of the poses, beside S
     and b. Gravity shows an accelerometer's bias along the vertical only."""
     error, up = context.static_errors(sensor), context.fitted.state.up
-    if sensor == GYRO:
-        rows, seen, known = error.T, np.ones((len(error), 1)), np.ones((len(error), 1))
-    else:
-        rows, seen, known = np.einsum("ni,ni->n", up, error)[None], up, context.norm_columns
-    basis = np.linalg.qr(known)[0]
+    seen, known = (np.ones((len(error), 1)),) * 2
+    if sensor == ACCELEROMETER:
+        error, seen, known = np.einsum("ni,ni->n", up, error)[:, None], up, context.norm_columns
     out = np.zeros(len(error) - 1)
     for k in range(len(out)):
-        later = np.where(np.arange(len(error))[:, None] > k, seen, 0.0)
-        own = np.linalg.svd(later - basis @ (basis.T @ later), full_matrices=False)
-        out[k] = ((rows @ own[0][:, own[1] > SEEN]) ** 2).sum()
+        later = np.arange(len(error))[:, None] > k
+        columns = np.hstack([known, np.where(later, seen, 0.0)])
+        out[k] = ((error - columns @ np.linalg.lstsq(columns, error)[0]) ** 2).sum()
     return out
 
 

@@ -18,6 +18,7 @@ from trihedron.probability import LEAST_P
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain, HeldOut, Where
 from trihedron.records.words import Words, effect_words, experiment_for, why_not
+from trihedron.session.drift import TYPICAL
 
 
 class Side(NamedTuple):
@@ -28,11 +29,11 @@ class Side(NamedTuple):
     unit: str
 
 
-TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
-"""3 mg and 0.1 °/s: typical errors of consumer parts."""
 ACCELEROMETER, GYRO = 0, 1
 SENSORS = (Side("accelerometer", "accel", "m/s^2"), Side("gyro", "gyro", "rad/s"))
 NOWHERE = Where()
+PRIOR_SCALES = (1.0, 0.3, 0.1)
+"""Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
 MOST_NAMED = 4
 """Places of one kind that a sentence names: more do not fit a line."""
 SHAPE_NAMES = ("time_constant", "half_width", "pose", "thermometer_lag", "step_time")
@@ -105,12 +106,12 @@ class Effect:
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
         """(k,) expected size of every parameter of a variant, one sigma.
 
-        Default without ``size``: the size that adds 3 mg or 0.1 °/s rms to the readings.
+        Default without ``size``: the size that adds to the readings, rms, what a bias changes while parts warm up.
         """
         if self.size > 0.0:
             return np.full(variant.distortion.n_parameters, self.size / abs(variant.scale))
         out = np.full(variant.distortion.n_parameters, np.inf)
-        for side, typical in ((variant.distortion.force, TYPICAL_M_S2), (variant.distortion.rate, TYPICAL_RAD_S)):
+        for side, typical in zip((variant.distortion.force, variant.distortion.rate), TYPICAL, strict=True):
             if side is not None:
                 rms = np.sqrt(np.einsum("nik,nik->k", side, side) / len(side))
                 out = np.minimum(out, typical / np.maximum(rms, TINY))

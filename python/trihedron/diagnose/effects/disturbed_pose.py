@@ -3,6 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
+from trihedron import _core
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import (
     MOST_NAMED,
@@ -13,23 +14,18 @@ from trihedron.diagnose.effects.contract import (
     per_axis,
 )
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF
-from trihedron.diagnose.residuals.within_poses import LOUD, loud_poses, pose_scatter
-from trihedron.diagnose.session.observations import Observations
-from trihedron.probability import LEAST_P, RARE_ALARM, SURE
+from trihedron.diagnose.residuals.within_poses import loud_poses, pose_scatter
+from trihedron.diagnose.session.observations import LOUD, Observations
+from trihedron.probability import LEAST_P, RARE_ALARM, SURE, chdtri
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import Words
 from trihedron.session.model import STATIC_ACCEL
-from trihedron.session.noise import half_changes
 
 BUMP_SIGMA = 7.0
 """Deviation of a 0.1 s mean from the line through its surroundings, in sigma: drift inside a pose stays below it."""
-FEWEST_BLOCKS = 4
-"""Blocks of 0.1 s that a pose must have: two on either side determine the line."""
-OUTLYING = 0.25
-"""Weight of a move below which its residual is in the tails: χ² above 32 with five degrees of freedom, p = 10⁻⁵."""
-IN_EITHER_HALF = 0.5
-"""Share of ``LOUD`` that vibration reaches in both halves of its pose; a disturbance is in one of them."""
+OUTLYING = 9.0 / (4.0 + chdtri(5, RARE_ALARM))
+"""Weight of a move below which its five residuals are in the tails (eq. 11.18a)."""
 
 
 def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
@@ -42,11 +38,12 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
     side = max(int(0.5 * rate), 5)
     block = max(int(0.1 * rate), 2)
     first, last = max(a - side, 0), min(b + side, len(obs.time_s))
-    n = (last - first) // block
-    if n < FEWEST_BLOCKS:
+    # Two blocks on either side at least determine the line.
+    n, edge = (last - first) // block, max(side // block, 2)
+    if n < 4:
         return None
     k = np.arange(n)
-    outer = (k < max(side // block, 2)) | (k >= n - max(side // block, 2))
+    outer = (k < edge) | (k >= n - edge)
     inside, outside = [], []
     for values in obs.whitened:
         means = values[first : first + n * block].reshape(n, block, 3).mean(axis=1)
@@ -73,7 +70,8 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
         steps = np.diff(x[pose.start : pose.stop][:, loud[i]], axis=0)
         early, late = (np.nanvar(half, axis=0) for half in np.array_split(steps, 2))
         usual = np.nanvar(steps, axis=0) / scatter.ratio[i, loud[i]]
-        if (np.minimum(early, late) > IN_EITHER_HALF * LOUD * usual).any():
+        # Vibration is in both halves of its pose, half as loud at least; a disturbance is in one of them.
+        if (2.0 * np.minimum(early, late) > LOUD * usual).any():
             found.append(int(i))
             before.append(float(np.mean(late / usual)))
             after.append(float(np.mean(late / early)))
@@ -94,7 +92,7 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     for raw, sigma in ((obs.raw_force, obs.pose_force_sigma), (obs.raw_rate, obs.pose_rate_sigma)):
         if raw is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
-            out |= (np.abs(half_changes(raw, obs.segments.spans)) > 2.0 * SURE * sigma).any(axis=1)
+            out |= (np.abs(_core.half_changes(raw, obs.segments.spans)) > 2.0 * SURE * sigma).any(axis=1)
     before, after = obs.move_poses[fitted.core.tails < OUTLYING].T
     out[np.intersect1d(before, after)] = True
     return out

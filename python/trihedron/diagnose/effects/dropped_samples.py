@@ -53,7 +53,7 @@ def counted_losses(context: Context) -> list[Loss]:
         return []
     size, begin = np.array([float(loss.count) for loss in losses]), (context.fitted.state, context.fitted.prior)
     columns = _of_each(context, losses)
-    fitted = solved(obs, *begin, columns, START_STRENGTHS, ANYTHING, size, is_scatter_free=True)
+    fitted = solved(obs, *begin, columns, START_STRENGTHS, ANYTHING, size)
     precision = np.linalg.inv(fitted.covariance()[-len(losses) :, -len(losses) :])
     slope, kept = precision @ fitted.state.effect[-len(losses) :], list(range(len(losses)))
     while kept:

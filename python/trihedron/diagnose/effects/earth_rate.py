@@ -9,6 +9,7 @@ from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, acting_on
+from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import chdtri
 from trihedron.records.diagnosis import EffectParameter
@@ -21,8 +22,6 @@ CLOSER = 6.0
 """Steps of the grid to either side of the best that the next grid covers, where an angle is surer than a step."""
 STATED = "stated_vertical"
 """Parameter of a log without Earth rate: the vertical component that the session model subtracts."""
-KNOWN = 1e-4
-"""Error of the stated latitude [rad], some hundred metres on the ground."""
 MISSES = chdtri(1, FALSE_ALARM)
 """χ² of the vector's length above which it is not Earth rate."""
 
@@ -75,7 +74,7 @@ def _turning(latitude: FloatArray, azimuth: FloatArray) -> FloatArray:
 def _nearest(variant: Variant, value: FloatArray, covariance: FloatArray) -> Turning:
     """The nearest Earth rate to the fitted components, with the vertical one where the latitude states it."""
     known = [up for up, _ in variant.shape.values()]
-    exact = np.full(len(known), (KNOWN * EARTH_RATE_RAD_S) ** 2)
+    exact = np.full(len(known), (PUBLISHED_DIGITS * EARTH_RATE_RAD_S) ** 2)
     return nearest_turning(np.append(value, known), block_diag(covariance, np.diag(exact)))
 
 

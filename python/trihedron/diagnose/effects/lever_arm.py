@@ -11,13 +11,12 @@ from trihedron.diagnose.effects.contract import DirectEffect, Effect, Evidence, 
 from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.records.domains import HeldOut, Where
 from trihedron.records.words import why_not
+from trihedron.session.noise import FEWEST_POSES
 
-FEWEST_MOVES = 6
-"""Twice the three unknowns of the arm: its uncertainty comes from the scatter between moves."""
 P_LIMIT = 1e-5
 """False-alarm rate of Hotelling's test: the travel of a hand follows the rotation by chance (rust/lever_arm.rs)."""
-SMOOTHED, SMOOTHED_S = 5, 0.04
-"""Window of the mean applied to both sides, samples and s: angular acceleration is a difference of noisy rates."""
+SMOOTHED_S = 0.05
+"""Window of the mean applied to both sides, s: angular acceleration is a difference of noisy rates."""
 
 
 class LeverArm(DirectEffect):
@@ -31,14 +30,14 @@ class LeverArm(DirectEffect):
     is_of_motion = True
 
     def unavailable(self, context: Context) -> str | None:
-        return why_not("six-moves") if len(_true_moves(context)) < FEWEST_MOVES else None
+        return why_not("six-moves") if len(_true_moves(context)) < FEWEST_POSES else None
 
     def find(self, context: Context) -> Evidence | None:
         moves = [(where.start, where.stop) for where in _true_moves(context)]
         found = _core.lever_arm_of_moves(
             (context.time_s, context.rate, context.force, context.gravity_in_moves), context.turned,
             np.array(moves),
-            smoothed=max(SMOOTHED, int(SMOOTHED_S * context.obs.recording.rate_hz)) | 1, fewest=FEWEST_MOVES,
+            smoothed=round(SMOOTHED_S * context.obs.recording.rate_hz) | 1, fewest=FEWEST_POSES,
         )  # fmt: skip
         if found is None:
             return None

@@ -14,17 +14,13 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import RARE_ALARM
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
-from trihedron.session.rounding import TWO_CODES, UNIFORM, before_adc
+from trihedron.session.noise import FEWEST_READINGS
+from trihedron.session.rounding import LEAST_WHITE, TWO_CODES, UNIFORM, before_adc
 
 MOST_CODES = 0.2
 """Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
-MOSTLY = 0.5
-"""Share of the static readings on one code from which a dead zone around it is tested."""
-ZONE_STEPS, JUST_OUTSIDE = 3.5, 20
-"""A dead zone is wider, in LSB, than the gap that two missing codes leave; readings required in the outer half of twice
-its width: evenly spread readings would all lie there by chance once in 2²⁰."""
-FEWEST_READINGS = 4
-"""Readings of a pose from which its codes determine a scatter."""
+ZONE_STEPS = 3.5
+"""A dead zone is wider, in LSB, than the gap that two missing codes leave."""
 LEAST_SHARE = 0.1
 """Share of the codes from which missing ones are named: exports that rescale counts lack up to 9 %, 16-bit converters 3
 to 5 %, which changes no mean."""
@@ -99,15 +95,13 @@ def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
     """Half-width of a zone around the commonest static code that no reading of the recording enters, or 0."""
     codes, counts = np.unique(values, return_counts=True)
     zero = float(codes[counts.argmax()])
-    if counts.max() < MOSTLY * len(values):
-        return 0.0
     away = np.abs(everything[everything != zero] - zero)
     if len(np.unique(away)) < 3:
         return 0.0
     nearest = float(away.min())
-    # Readings just outside must be common: few readings may miss a zone by chance.
-    beyond = int((away < 2.0 * nearest).sum())
-    return nearest if nearest > ZONE_STEPS * step and beyond >= JUST_OUTSIDE else 0.0
+    # Of readings spread evenly over twice its width each would lie in the outer half by a chance of a half.
+    by_chance = 0.5 ** int((away < 2.0 * nearest).sum())
+    return nearest if nearest > ZONE_STEPS * step and by_chance < RARE_ALARM else 0.0
 
 
 class Quantisation(DirectEffect):
@@ -208,10 +202,6 @@ def _scale_of(context: Context, channel: int) -> tuple[float, float]:
     return float(context.si_per_raw(channel // 3)[k]), sigma / abs(float(S[k, k]))
 
 
-LEAST_LEFT = 0.01
-"""Least share of a mean's variance that remains once its codes are resolved."""
-
-
 def _resolved(obs: Observations, one: Lattice) -> Observations:
     """Observations with one channel's pose means and noise as estimated from the codes."""
     is_accel = one.channel < 3
@@ -228,6 +218,6 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
         # Change of the variance along the vertical.
         up, error = obs.force_up
         changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.pose_force_sigma[:, k] ** 2)
-        obs = replace(obs, force_up=(up, np.sqrt(np.maximum(error**2 + changed, LEAST_LEFT * error**2))))
+        obs = replace(obs, force_up=(up, np.sqrt(np.maximum(error**2 + changed, LEAST_WHITE * error**2))))
     known = {f"pose_{kind}": mean, f"pose_{kind}_sigma": sigma, f"{kind}_density": density}
     return replace(obs, **known)

@@ -25,8 +25,6 @@ NEAR_LIMIT = 0.97
 BEYOND = 0.1
 """Least share of the parabola on a plateau by which the motion clearly exceeds the limit: one of constant rate does
 not."""
-ABOVE_REST = 1.2
-"""Poses and gentle moves alike come close to a range limit below 1.2 g."""
 
 
 @dataclass(frozen=True)
@@ -141,8 +139,8 @@ class _Saturation(DirectEffect):
         limit = min(abs((run.limit.value - origin[run.axis]) * scale[run.axis] + bias[run.axis]) for run in runs)
         close = {m for m, (a, b) in enumerate(context.obs.move_ranges)
                  if (np.abs(raw[a:b] * scale + bias).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
-        # An accelerometer with a range of little more than 1 g comes close in every pose: then only plateaus count.
-        is_near_rest = self.sensor == ACCELEROMETER and limit <= ABOVE_REST * context.fitted.state.gravity
+        # An accelerometer with a range of little more than 1 g comes close at rest: then only plateaus count.
+        is_near_rest = self.sensor == ACCELEROMETER and limit * NEAR_LIMIT <= context.fitted.state.gravity
         return touched if is_near_rest else sorted(close | set(touched))
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:

@@ -17,13 +17,10 @@ from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import CLEAR
 from trihedron.records.diagnosis import EffectParameter
 
-TIMES_S = (0.004, 0.016, 0.064)
-"""Times tried, s, each four times the one before; of those between, the columns are computed for the size found."""
-NEAR_ONE = (0.6, 1.6)
-"""Range of a confirmed parameter: outside it another time of the grid fits better, or the mechanism does not."""
-SMOOTHING_SIGMA = (0.6, 1.0)
-"""Prior σ of the variance of a filter's response over the square of its lag, which is between 0 and 1, and of one that
-both sensors have beyond that of the session."""
+STEP = 4.0
+"""Ratio of the times tried; of those between, the columns are computed for the size found. A confirmed parameter is
+within the root of it from one: outside, another time of the grid fits better, or the mechanism does not."""
+TIMES_S = tuple(0.001 * STEP**k for k in (1, 2, 3))
 SEPARATE, DELAYS, BOTH = "per axis", ", without smoothing", "smoothing_of_both"
 
 
@@ -38,12 +35,13 @@ class _Late(Effect):
     def sizes(self, context: Context, variant: Variant) -> FloatArray:
         sizes = super().sizes(context, variant)
         if variant.names[-1] == BOTH:
-            sizes[1:] = SMOOTHING_SIGMA[-len(sizes) + 1 :]
+            # The variance of a filter's response is up to the square of its lag.
+            sizes[1:] = 1.0
         return sizes
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         sigma = CLEAR * float(sigmas_of(covariance)[0])
-        return bool(max(NEAR_ONE[0] - sigma, 0.0) < value[0] < NEAR_ONE[1] + sigma)
+        return bool(max(STEP**-0.5 - sigma, 0.0) < value[0] < STEP**0.5 + sigma)
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         lags = super().parameters(variant, value, covariance)

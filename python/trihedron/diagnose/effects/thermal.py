@@ -9,12 +9,8 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, SENSORS, Effect, Variant, on_axes
 from trihedron.diagnose.session.solve import stacked
 from trihedron.records.words import why_not
-from trihedron.session.drift import LEAST_SWING_K, PER_KELVIN
+from trihedron.session.drift import LEAST_SWING_K, PER_KELVIN, SLOW_S
 
-LAGS_S = (5.0, 10.0, 20.0, 40.0)
-"""Lags tried, s, of either sign, then refined: from a thermometer beside the die to one on the board."""
-LEAST_SWING_V = 1e-4
-"""A logged supply that changes by less is ignored: a tenth of a millivolt is far below any regulator's noise."""
 CURVES = ("linear", "quadratic", "cubic")
 LAG, RATE, HYSTERESIS = "lag", "rate", "hysteresis"
 BRANCH_K_S = 0.002
@@ -83,7 +79,7 @@ class ThermalBias(Thermal):
         out += [self._over_temperature(context, f"{curve}, {HYSTERESIS}") for curve in bent if is_cycle]
         # Gradients across the part follow the rate, on each axis by a factor of its own.
         out += [self._over_temperature(context, f"{curve}, {RATE}") for curve in bent]
-        lags = [sign * lag_s for sign in (1.0, -1.0) for lag_s in LAGS_S]
+        lags = [sign * lag_s for sign in (1.0, -1.0) for lag_s in SLOW_S]
         return out + [self._over_temperature(context, f"{curve}, {LAG}", one) for curve in bent for one in lags]
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
@@ -125,7 +121,7 @@ class SupplySensitivity(Effect):
     def unavailable(self, context: Context) -> str | None:
         if context.supply is None:
             return why_not("no-supply")
-        return why_not("steady-supply") if np.ptp(context.supply) < LEAST_SWING_V else None
+        return None if np.ptp(context.supply) > 0.0 else why_not("steady-supply")
 
     def variants(self, context: Context) -> list[Variant]:
         assert context.supply is not None

@@ -5,13 +5,11 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, Effect, Variant, on_axes
+from trihedron.diagnose.session.observations import LOUD
 from trihedron.records.words import why_not
 
 ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
 """1/(m/s²), 200 mg/g², and (rad/s)/(m/s²)²: prior sigma for vibrating consumer parts; a tenth of it is tried too."""
-STANDS_OUT = 1.5
-"""Power of a pose over the median pose: the variance of 300 white readings has an uncertainty of 8 %; at most 1.13 in
-48 healthy sessions."""
 
 
 class VibrationRectification(Effect):
@@ -25,7 +23,7 @@ class VibrationRectification(Effect):
 
     def unavailable(self, context: Context) -> str | None:
         power = context.pose_power.sum(axis=1)
-        return why_not("even-vibration") if power.max() < STANDS_OUT * np.median(power) else None
+        return why_not("even-vibration") if power.max() < LOUD * np.median(power) else None
 
     def variants(self, context: Context) -> list[Variant]:
         excess = context.vibration_power

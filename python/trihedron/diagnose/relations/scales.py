@@ -6,11 +6,8 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.bias_process import COSINES
+from trihedron.diagnose.effects.bias_process import COSINES, N_STEPS
 from trihedron.diagnose.relations.dependence import ALL_AXES, Column, Dependence
-
-MOST_STEPS = 8
-"""Places of a step that are tried: one that is half a place away still has most of its evidence."""
 
 
 class ScaleInTime(Dependence):
@@ -34,7 +31,7 @@ def scales_in_time(context: Context, sensor: int) -> list[Dependence]:
     """Line, slow curve, and steps between poses, evenly spread over them."""
     x, times, h, unit = context.elapsed, context.time_s, context.obs.n_poses, ("g", "rad/s")[sensor]
     middle = 0.5 * (times[: h - 1] + times[1:h])
-    places = middle[np.unique(np.linspace(0, h - 2, MOST_STEPS + 2)[1:-1].round().astype(int))]
+    places = middle[np.unique(np.linspace(0, h - 2, N_STEPS + 2)[1:-1].round().astype(int))]
     line = [("over time", x, unit)]
     curve = [(f"times cosine {k} of time", np.cos(np.pi * k * x), unit) for k in COSINES]
     steps = [[(f"after {at:.0f} s", (times > at).astype(np.float64), unit)] for at in places]

@@ -58,7 +58,7 @@ def _leading(model: Hypothesis, known: set[str], limit: float) -> list[Follows]:
     """The relation of most evidence, if it predicts what is held out; random telegraph signals by their own score."""
     every: dict[str, Dependence] = {one.id: one for one in dependences(model.context)}
     out = []
-    tried, _ = candidates_beside(model, list[Effect](every.values()), known)
+    tried = candidates_beside(model, list[Effect](every.values()), known)
     standing = [one for one in tried if one.score > limit]
     larger, term = with_best(model, standing) if standing else (model, None)
     if term is not None and larger.is_shown(model, len(model.terms)):

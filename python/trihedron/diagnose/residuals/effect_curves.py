@@ -44,20 +44,15 @@ def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ())
 
 
 def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
-    state, obs, core = fitted.state, fitted.obs, fitted.core
-    h, effects = obs.n_poses, fitted.distortion
-    poses = obs.pose_names(range(h))
-    force = obs.pose_force @ state.accel_S.T
-    force = force + (core.force_bias - state.accel_bias if 0 in named else core.session_force_bias)
-    if effects.force is not None:
-        force = force - effects.force[:h] @ state.effect
+    state, obs, core, context = fitted.state, fitted.obs, fitted.core, Context(fitted)
+    poses = obs.pose_names(range(obs.n_poses))
+    bias = state.accel_b - state.accel_bias if 0 in named else core.session_force_bias
+    force = context.static_errors(0) + state.gravity * state.up + (bias - state.accel_b)
     size = np.linalg.norm(force, axis=1)
     sigma = obs.norm_sigma((force / size[:, None]) @ state.accel_S)
     out: dict[str, _Shown] = {"static-accel": (obs.pose_time_s, (size - state.gravity)[:, None], sigma, poses)}
     if obs.pose_rate is not None and obs.pose_rate_sigma is not None:
-        rate = obs.pose_rate @ state.gyro_S.T
-        if effects.rate is not None:
-            rate = rate - effects.rate[:h] @ state.effect
+        rate = context.static_errors(1)
         spread = np.sqrt((obs.pose_rate_sigma**2 @ (state.gyro_S**2).T).mean(axis=1))
         bias = state.gyro_bias if 1 in named else rate.mean(axis=0)
         out["static-gyro"] = obs.pose_time_s, rate - bias, spread, poses

@@ -1,7 +1,5 @@
 """Test of each domain against its predicted noise, and where the misfit is."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.special import fdtrc
 
@@ -9,9 +7,8 @@ from trihedron.arrays import FloatArray, rms_of
 from trihedron.diagnose.session.solve import Fit
 from trihedron.probability import CLEAR, f_upper
 from trihedron.records.domains import DOMAINS, Domain, DomainTest, Where
-from trihedron.sensor_model import axis_scales
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
-from trihedron.session.noise import NOISE_CORNER_S, NOISE_DOF
+from trihedron.session.noise import NOISE_DOF
 
 ROW_DOMAINS: dict[int, Domain] = {
     STATIC_ACCEL: "static-accel", STATIC_GYRO: "static-gyro", MOVES: "moves", DYNAMICS: "dynamics"
@@ -23,8 +20,6 @@ N_DOMAINS_TESTED = float(len(DOMAINS))
 """Four domains of poses and moves, two of samples: they share the false-alarm rate."""
 LEAST_DOF = 0.5
 """Degrees of freedom below which the fit has used up a domain."""
-CARRIES = 0.2
-"""A channel with a fifth of the misfit is named as its location."""
 
 _CHANNELS = {domain: CHANNELS[3:] if domain in (STATIC_GYRO, MOVES) else CHANNELS[:3] for domain in ROW_DOMAINS}
 
@@ -54,34 +49,6 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
     return tuple(tests)
 
 
-AT_END = 1.01
-"""Ratio to a bound below which a strength counts as at the bound."""
-
-
-@dataclass(frozen=True)
-class HiddenBias:
-    """Bias changes that the random walk of a sensor absorbed, SI: ``rms`` about the mean, ``noise`` the median error of
-    a pose mean, with scatter where that was named, and whether the walk is at its upper bound."""
-
-    rms: float
-    noise: float
-    is_at_edge: bool
-
-
-def hidden_biases(fitted: Fit) -> tuple[HiddenBias, HiddenBias | None]:
-    """Accelerometer, gyro: biases of the poses about their session mean, as the random walk absorbed them."""
-    state, obs = fitted.state, fitted.obs
-
-    def of(sensor: int, noise: FloatArray) -> HiddenBias:
-        bias, corner = fitted.bias(sensor), fitted.core.strengths[0][sensor]
-        return HiddenBias(
-            rms_of(bias - bias.mean(axis=0)), float(np.median(noise)), bool(corner <= AT_END * NOISE_CORNER_S)
-        )
-
-    accel, of_rate = of(0, obs.norm_sigma(state.up @ state.accel_S)), obs.pose_rate_sigma
-    return accel, None if of_rate is None else of(1, of_rate * axis_scales(state.gyro_S))
-
-
 def locate(fitted: Fit, label: int) -> Where:
     """The channels and segments that carry a domain's misfit."""
     system, obs = fitted.system, fitted.obs
@@ -92,7 +59,7 @@ def locate(fitted: Fit, label: int) -> Where:
     heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > CLEAR**2][:5]
     per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
     names = _CHANNELS[label]
-    channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > CARRIES * per_channel.sum())
+    channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] >= per_channel.mean())
     if label in (STATIC_ACCEL, STATIC_GYRO):
         return Where(channels, obs.pose_names(heavy), obs.times(obs.segments.spans[heavy]))
     return Where(channels, obs.move_names(heavy), obs.times(obs.move_ranges[s] for s in heavy))

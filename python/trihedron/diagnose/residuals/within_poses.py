@@ -11,7 +11,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.noise_level import noise_changes
-from trihedron.diagnose.session.observations import Observations
+from trihedron.diagnose.session.observations import LOUD, Observations
 from trihedron.probability import LEAST_P, RARE_ALARM
 from trihedron.records.domains import DomainTest, Where
 from trihedron.session.noise import FEWEST_READINGS
@@ -19,9 +19,6 @@ from trihedron.session.noise import FEWEST_READINGS
 MIN_LINE_SHARE = 0.03
 """Share of the variance below which a line is ignored: long poses resolve lines far below the noise that change no
 result."""
-LOUD = 3.0
-"""Variance of a pose over that of the others from which it disagrees, and is named: real noise is not exactly Gaussian
-or white, and a pose on another support has 50 % more."""
 N_TESTS = 3.0
 """Lines, noisy poses and changes of noise."""
 

@@ -14,7 +14,6 @@ from trihedron.arrays import TINY, BoolArray, FloatArray
 from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
-from trihedron.session.averaging import sharpened
 from trihedron.session.model import Prior, SessionReadings, SessionState
 from trihedron.session.noise import FEWEST_READINGS, along_gradient, measure_noise
 from trihedron.session.rounding import (
@@ -26,9 +25,9 @@ from trihedron.session.rounding import (
 )
 from trihedron.session.support import Support, support_of
 
-UNSTEADY = 2.0
-"""Error of a pose's mean over that of a usual pose in the session, above which the pose was not static: errors of means
-have an uncertainty of a fifth."""
+LOUD = 3.0
+"""Variance of a pose over that of a usual one in the session from which it was not static: real noise is not exactly
+Gaussian or white, and a pose on another support has 50 % more."""
 LONGEST_MOVE_S = 180.0
 """Longest move that is integrated, s: hand moves take seconds, a fixture minutes; beyond it the bias dominates."""
 
@@ -132,10 +131,9 @@ class Observations(SessionReadings):
         means = _core.column_means(flat, np.array(ranges), np.array(owner), len(poses))
         return np.asarray(means.reshape(-1, *samples.shape[1:]))
 
-    def model(self, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False) -> _core.SessionModel:
-        """The Rust model; with ``is_scatter_free`` biases may differ from pose to pose."""
-        timing_s = float(self.jitter_s), 1.0 / self.recording.rate_hz
-        return self.core_model(gravity_m_s2, self.core_moves, timing_s, prior, is_scatter_free=is_scatter_free)
+    def model(self, gravity_m_s2: float, prior: Prior | None) -> _core.SessionModel:
+        """The Rust model."""
+        return self.core_model(gravity_m_s2, self.core_moves, (self.jitter_s, 1.0 / self.recording.rate_hz), prior)
 
     @cached_property
     def rounding_at_points(self) -> FloatArray | None:
@@ -151,7 +149,7 @@ class Observations(SessionReadings):
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves in the core, prepared once for many fits."""
         force, rate = (
-            None if raw is None else np.ascontiguousarray(sharpened(raw, self.time_s, self.averaging))
+            None if raw is None else _core.sharpened(raw, self.time_s, self.averaging)
             for raw in (self.raw_force, self.raw_rate)
         )
         assert force is not None
@@ -257,7 +255,7 @@ def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
     against its middle by that error times half the pose. It is zero for poses with the session's usual noise.
     """
     usual = np.median(rate_sigma**2 * lasts_s[:, None], axis=0) / lasts_s[:, None]
-    return np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2
+    return np.maximum(rate_sigma**2 - LOUD * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2
 
 
 def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segments, FloatArray]:

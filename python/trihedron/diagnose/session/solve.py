@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.arrays import TINY, FloatArray, IntArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.session.model import (
     DYNAMICS,
@@ -26,7 +26,7 @@ from trihedron.session.model import (
     core_state,
     state_of,
 )
-from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.noise import Bounds, Strengths
 
 FOLDS = 8
 """Blocks of poses, and of moves, that are held out in turn."""
@@ -114,6 +114,18 @@ class Fit:
         """(poses, 3) biases of the accelerometer (0) or the gyro (1), SI."""
         return (self.state.accel_bias, self.state.gyro_bias)[sensor]
 
+    @cached_property
+    def held_out(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """χ² (domains,) and number of rows (domains,) of blocks of poses or moves predicted from all others (blocked
+        cross-validation, eq. 11.15), and innovations (rows,) over each row's own noise alone, so that a model with a
+        wider prediction does not look better in physical units.
+
+        The training rows do not determine the vertical and biases of a held-out pose. A weak prior (its column scale)
+        makes them finite; it is the same for every model that is compared.
+        """
+        chi2, _, n_rows, _, innovation = self.core.held_out(folds(self))
+        return chi2.sum(axis=0), n_rows, innovation
+
     def covariance(self) -> FloatArray:
         """(18 + effects, same) covariance of the shared unknowns: S_a lower, b_a, S_w on centred readings, effects."""
         return self.core.border_covariance()
@@ -136,8 +148,6 @@ def solved(
     strengths: Strengths,
     within: Bounds | None = None,
     sizes: FloatArray | None = None,
-    *,
-    is_scatter_free: bool,
 ) -> Fit:
     """Gauss-Newton on every row to convergence (eq. 11.9); noise strengths as given or likeliest ``within`` bounds.
 
@@ -149,52 +159,14 @@ def solved(
         sizes = obs.rounding_sigma if sizes is None else np.concatenate([obs.rounding_sigma, sizes])
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
-    core = obs.model(start.gravity, prior, is_scatter_free=is_scatter_free).fit(
+    core = obs.model(start.gravity, prior).fit(
         state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate), within=within, sizes=None if sizes is None else sizes.tolist(),
     )  # fmt: skip
     return Fit(obs, state_of(core, start.gravity), distortion, prior, core)
 
 
-def fit(obs: Observations, start: SessionState, prior: Prior | None, within: Bounds | None = None) -> Fit:
-    """The session without effects, noise corners as in ``start``, or free ``within`` bounds."""
-    start = replace(start, effect=np.zeros(0))
-    strengths = start.strengths[0], *START_STRENGTHS[1:]
-    return solved(obs, start, prior, NO_DISTORTION, strengths, within, is_scatter_free=False)
-
-
-def tune_noise(obs: Observations, start: SessionState, prior: Prior | None) -> Fit:
-    """As :func:`fit`, with bias walks of maximum likelihood, bounded by the noise of parts (eq. 11.18)."""
-    return fit(obs, start, prior, PART_NOISE)
-
-
-def move_residuals(obs: Observations, state: SessionState) -> FloatArray:
-    """(moves, 5) residuals of gravity and velocity after every move at a fixed state, in units of their noise."""
-    return np.asarray(obs.model(state.gravity, None).move_residuals(core_state(state)))
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """Held-out prediction of rows: innovation chi-square per fold and domain, log-determinant, and the innovations.
-
-    ``fold_chi2`` (folds, domains), ``fold_log_det`` (folds,) log-determinant of the predicted covariance, ``n_rows``
-    (domains,), ``residual`` (rows,) whitened innovations; ``innovation`` (rows,) the same over each row's own noise
-    alone, so that a model with a wider prediction does not look better in physical units.
-    """
-
-    fold_chi2: FloatArray
-    fold_log_det: FloatArray
-    n_rows: FloatArray
-    residual: FloatArray
-    innovation: FloatArray
-
-    @property
-    def per_row(self) -> FloatArray:
-        """(domains,) innovation chi-square per row."""
-        return np.asarray(self.fold_chi2.sum(axis=0) / np.maximum(self.n_rows, TINY))
-
-
-def _folds(fitted: Fit) -> npt.NDArray[np.bool_]:
+def folds(fitted: Fit) -> npt.NDArray[np.bool_]:
     """(folds, rows) blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
     system, obs = fitted.system, fitted.obs
     direct = system.walk == 0
@@ -204,12 +176,3 @@ def _folds(fitted: Fit) -> npt.NDArray[np.bool_]:
         blocks = np.array_split(np.arange(count), min(FOLDS, max(count // 2, 1)))
         out += [held for block in blocks if (held := rows & np.isin(system.segment, block)).any()]
     return np.array(out, dtype=bool).reshape(len(out), len(direct))
-
-
-def predict_held_out(fitted: Fit) -> Prediction:
-    """Predict every block of poses or moves from all others (blocked cross-validation, eq. 11.15).
-
-    The training rows do not determine the vertical and biases of a held-out pose. A weak prior (its column scale) makes
-    them finite; it is the same for every model that is compared.
-    """
-    return Prediction(*fitted.core.held_out(_folds(fitted)))

@@ -15,10 +15,9 @@ from trihedron.session.model import LOWER, Prior, SessionState
 from trihedron.transforms import directions_of
 from trihedron.units import acceleration_to_si, rate_to_si
 
-OPEN_BIAS_M_S2, OPEN_SCALE = 0.3, 0.03
-"""Standard uncertainties above which the poses do not determine the accelerometer: bias, relative scale."""
 TYPICAL_BIAS_M_S2, TYPICAL_SCALE, TYPICAL_ANGLE = 0.5, 0.05, 0.03
-"""Prior σ about a plain triad of nominal scale: bias, relative scale, axis angles (rad)."""
+"""How parts differ from a plain triad of nominal scale, one sigma: bias, relative scale, axis angles (rad). Poses that
+leave the accelerometer as uncertain do not determine it."""
 LEAST_ANGLE_RAD = 0.5
 """Angle between two verticals from which a move determines the gyro scale: errors of 1° each make it 5 % at worst."""
 PUBLISHED_DIGITS = 1e-6
@@ -58,7 +57,7 @@ def is_open(calibration: Calibration) -> bool:
     sigma = np.sqrt(np.diag(np.asarray(sensor.covariance))[:12])
     scale = float(np.abs(np.linalg.det(sensor.S))) ** (1.0 / 3.0)
     of_scales, of_biases = sigma[:9].max(), sigma[9:].max()
-    return bool(of_biases > OPEN_BIAS_M_S2 or of_scales > OPEN_SCALE * scale)
+    return bool(of_biases > TYPICAL_BIAS_M_S2 or of_scales > TYPICAL_SCALE * scale)
 
 
 def starts_nominal(calibration: Calibration) -> bool:

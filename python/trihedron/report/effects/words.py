@@ -41,12 +41,9 @@ def drifts(sensor: str, unit: str, walk: str, beside: str = "") -> Mapping[str, 
     """Bias drift by its kind, ``beside`` what else a slow one may be. Readings of unknown scale in a log of one
     orientation stay counts."""
     whole = f"The {sensor} bias {{how}} by {{sizes}} (X, Y, Z); no logged channel explains it."
-    sizes = {"": f"{{range:all .2g {unit}}}", "-counts": "{range:all .3g} counts"}
-    return {
-        way + of: whole.format(how=how, sizes=own) + also
-        for way, how, also in (("walk", walk, beside), ("static", "drifts smoothly", beside), ("step", JUMPS, ""))
-        for of, own in sizes.items()
-    }
+    sizes = f"{{is_counts:?{{range:all .3g}} counts|{{range:all .2g {unit}}}}}"
+    ways = ("walk", walk, beside), ("static", "drifts smoothly", beside), ("step", JUMPS, "")
+    return {way: whole.format(how=how, sizes=sizes) + also for way, how, also in ways}
 
 
 def saturates(sensor: str) -> EffectWords:
