@@ -31,24 +31,18 @@ class Loss:
     sigma: float = 0.0
 
 
-def find_losses(obs: Observations) -> list[Loss]:
-    """Intervals where the motion joins only with samples missing between its two sides (eq. 8.16), in order."""
-    moves = np.array(obs.move_ranges, dtype=np.int64).reshape(-1, 2)
-    found = joints(list(obs.whitened), obs.time_s, obs.recording.rate_hz, moves, clipped_samples(obs))
-    owner = [int(np.flatnonzero((moves[:, 0] <= k) & (k < moves[:, 1]))[0]) for k in found.sample]
-    each = zip(found.sample, owner, found.count, found.gain, strict=True)
-    losses = [Loss(int(k), m, int(count), 2.0 * float(gain)) for k, m, count, gain in each]
-    return sorted(losses, key=lambda loss: loss.sample)
-
-
 def counted_losses(context: Context) -> list[Loss]:
-    """Losses with the counts that gravity and zero velocity after the moves determine.
+    """Losses in order, with the counts that gravity and zero velocity after the moves determine (eq. 8.16b).
 
-    The joint of the two sides of a gap gives the place and an approximate count. A lost sample takes the motion at its
-    place from the integrals of its move: its count is a parameter of the session, fitted with all others. A jolt looks
-    like a loss; its count is none. The weakest are left out one by one while the odds are against them.
+    The joint of the two sides of a gap gives the place and an approximate count (eq. 8.16). A lost sample takes the
+    motion at its place from the integrals of its move: its count is a parameter of the session, fitted with all others.
+    A jolt looks like a loss; its count is none. The weakest are left out one by one while the odds are against them.
     """
-    obs, losses = context.obs, find_losses(context.obs)
+    obs, moves = context.obs, np.array(context.obs.move_ranges, dtype=np.int64).reshape(-1, 2)
+    found = joints(list(obs.whitened), obs.time_s, obs.recording.rate_hz, moves, clipped_samples(obs))
+    owner = np.searchsorted(moves[:, 0], found.sample, side="right") - 1
+    each = zip(found.sample.tolist(), owner.tolist(), found.count.tolist(), (2.0 * found.gain).tolist(), strict=True)
+    losses = [Loss(*one) for one in sorted(each)]
     if not losses:
         return []
     size, begin = np.array([float(loss.count) for loss in losses]), (context.fitted.state, context.fitted.prior)

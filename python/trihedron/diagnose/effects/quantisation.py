@@ -40,8 +40,8 @@ class Lattice:
     step: float
     sigma: float
     scatter: float
-    mean_shift: FloatArray
-    mean_sigma: FloatArray
+    mean_shift: FloatArray | float
+    mean_sigma: FloatArray | float
     missing: int = 0
     shifted: float = 0.0
     dead: float = 0.0
@@ -156,16 +156,15 @@ class Quantisation(DirectEffect):
             dead = dead_zone(still, moving[np.isfinite(moving)], step)
             if not dead:
                 return None
-            size = np.full(len(poses), dead / np.sqrt(3.0))  # anywhere inside the zone
-            return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(poses)), size, dead=dead)
+            anywhere_inside = dead / np.sqrt(3.0)
+            return Lattice(c, dead, anywhere_inside, dead, 0.0, anywhere_inside, dead=dead)
         number, share, error = missing
         if share > LEAST_SHARE:
             density = obs.force_density if c < 3 else obs.rate_density
             assert density is not None
             variance = density[c % 3] ** 2 * obs.recording.rate_hz
             sigma = float(np.sqrt(max(variance - UNIFORM * step**2, variance / 2.0)))
-            errors = np.full(len(poses), error * step)
-            return Lattice(c, step, sigma, sigma, np.zeros(len(poses)), errors, number, share)
+            return Lattice(c, step, sigma, sigma, 0.0, error * step, number, share)
         # The staircase of a mean is exp(-2π²σ²)/π LSB, for σ of half an LSB 2·10⁻³: averaging resolves the LSB.
         if scatter**2 > (TWO_CODES + UNIFORM) * step**2:
             return None

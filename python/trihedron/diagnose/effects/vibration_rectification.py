@@ -7,9 +7,11 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import ACCELEROMETER, GYRO, Effect, Variant, on_axes
 from trihedron.diagnose.session.observations import LOUD
 from trihedron.records.words import why_not
+from trihedron.session.drift import TYPICAL
 
-ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
-"""1/(m/s²), 200 mg/g², and (rad/s)/(m/s²)²: prior sigma for vibrating consumer parts; a tenth of it is tried too."""
+SHAKEN = 2.5
+"""Vibration power, (m/s²)², by which the bias of consumer parts changes as while they warm up, one sigma: 200 mg/g²; a
+tenth of it is tried too."""
 
 
 class VibrationRectification(Effect):
@@ -19,7 +21,7 @@ class VibrationRectification(Effect):
     accounts_for = ("within-static",)  # the vibration itself
 
     def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
-        return np.full(3, GYRO_PER_POWER if variant.distortion.force is None else ACCEL_PER_POWER)
+        return np.full(3, TYPICAL[GYRO if variant.distortion.force is None else ACCELEROMETER] / SHAKEN)
 
     def unavailable(self, context: Context) -> str | None:
         power = context.pose_power.sum(axis=1)
