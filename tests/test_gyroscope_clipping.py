@@ -9,13 +9,13 @@ from scipy.stats import binom
 import trihedron
 from diagnosed_session import unit_of
 from hand_made_sessions import G, Instrument, recorded
-from trihedron import calibrate
+from trihedron import _core, calibrate
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.gyroscope.measurements import bridge_clipping
 from trihedron.estimate.gyroscope.stated_turns import TableTurns, measure_turns
 from trihedron.records import Calibration, Move, Recording, SensorCalibration
 from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
-from trihedron.session.rounding import rounding_variance
+from trihedron.session.rounding import STEADY
 from trihedron.simulate import hand_session, simulate
 from trihedron.units import RateUnit
 
@@ -99,7 +99,7 @@ def test_settling_inside_a_step_is_charged_whichever_way_the_moves_go(noise, way
         rate = np.concatenate([into * 60.0 * np.exp(-n / tau), out_of * 60.0 * np.exp(-n[::-1] / tau)])
         codes = np.round(rate + zero + noise * rng.normal(size=len(rate)))
         three = np.repeat(codes[:, None], 3, 1)
-        variance = rounding_variance(three, np.ones(3), np.zeros(3), np.array([True] * 3))[:, 0]
+        variance = _core.rounding_variance(three, (np.ones(3), np.zeros(3), np.array([True] * 3)), STEADY)[:, 0]
         for part, way in ((slice(0, 400), into), (slice(400, 800), out_of)):
             # What is turned below the edge of the step in which the bias lies is never read.
             is_hidden = np.abs(rate[part]) < 0.5 - way * zero

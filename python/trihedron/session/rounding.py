@@ -28,43 +28,27 @@ def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
     return (quantum > 0.0) & (sigma**2 < TWO_CODES * quantum**2)
 
 
-def rounding_variance(
-    readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray
-) -> FloatArray | None:
-    """Rounding variance (n, 3) of readings for sums that treat them as independent; ``None`` where no axis needs it.
-
-    In the LSB ``quantum`` (3,) of the ``rest`` reading (3,) the error is that of the bias, which is not included here,
-    except at the start and the end of a move that are still inside that step; NaN where there is no bias.
-    """
-    return _core.rounding_variance(readings, (quantum, rest, axes), STEADY) if np.any(axes) else None
-
-
 def rounding_of_moves(
     readings: FloatArray, ranges: list[tuple[int, int]], quantum: FloatArray, sigma: FloatArray
 ) -> FloatArray:
-    """Variance (moves, 3) of the sums of readings (n, 3) over ``ranges``; noise ``sigma`` (3,) may not dither the ADC.
+    """Variance (moves, 3) of the sums of readings (n, 3) over ``ranges`` by rounding to the LSB ``quantum`` (3,), as of
+    independent ones; noise ``sigma`` (3,) may not dither the ADC.
 
     A move begins and ends in the LSB of its poses: its readings there have the same error as their means.
     """
-    axes = undithered_axes(quantum, sigma)
-    nowhere = np.full(3, np.nan)
-    found = [rounding_variance(readings[a:b], quantum, nowhere, axes) for a, b in ranges]
-    return np.array([np.zeros(3) if of_move is None else of_move.sum(axis=0) for of_move in found]).reshape(-1, 3)
+    axes, nowhere = undithered_axes(quantum, sigma), np.full(3, np.nan)
+    if not axes.any():
+        return np.zeros((len(ranges), 3))
+    adc = quantum, nowhere, axes
+    found = [_core.rounding_variance(readings[a:b], adc, STEADY).sum(axis=0) for a, b in ranges]
+    return np.array(found).reshape(-1, 3)
 
 
 def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
-    """Rate noise (3,) [raw·√s], on undithered axes without the rounding that :func:`rounding_variance` adds."""
+    """Rate noise (3,) [raw·√s], on undithered axes without the rounding that is added reading by reading."""
     rounding = UNIFORM * quantum**2 * step_s
     rest = np.maximum(density**2 - rounding, LEAST_WHITE * rounding)
     return np.where(axes, np.sqrt(rest), density)
-
-
-def static_reading(means: FloatArray, quantum: FloatArray) -> FloatArray:
-    """(3,) mean of the means (n, 3) of the poses within an LSB of their median: a bias near the edge of a code has one
-    code in some poses, the next one in others."""
-    away = np.abs(means - medians(means))
-    is_near = away <= np.maximum(quantum, away.min(axis=0))
-    return np.asarray(np.mean(means, axis=0, where=is_near))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +77,10 @@ def rounding_in_moves(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rounding of undithered ``axes`` (3,) in the moves ``edges`` (m, 2): variance (n, 3), 1 where a reading is in the
     LSB of its bias (n, 3), errors (n, 3, k) that all moves share. ``means`` (h, 3) are those of the poses."""
-    adc = quantum, static_reading(means, quantum), axes
+    # A bias near the edge of a code has one code in some poses, the next one in others.
+    away = np.abs(means - medians(means))
+    rest = np.mean(means, axis=0, where=away <= np.maximum(quantum, away.min(axis=0)))
+    adc = quantum, rest, axes
     variance, is_static, shared = _core.rounding_in_moves(readings, adc, edges, STEADY)
     errors = np.zeros((*readings.shape, len(shared)))
     for k, (axis, error) in enumerate(shared):

@@ -102,7 +102,7 @@ class _Saturation(DirectEffect):
         return Evidence(
             p, -2.0 * np.log(p), self._limits(context, runs, sigma), statement, "moves" if is_gyro else "dynamics",
             Where(channels, obs.move_names(touched[:8]), obs.times((r.start, r.stop) for r in runs[:8])),
-            reweigh=lambda old: old.without_moves(old.moves_from(begins)),
+            reweigh=lambda old: old.without_moves_from(begins),
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had biased the scale factors
         )  # fmt: skip
 

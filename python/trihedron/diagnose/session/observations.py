@@ -83,14 +83,11 @@ class Observations(SessionReadings):
         """First and last time [s] of half-open ranges of samples."""
         return tuple((float(self.time_s[start]), float(self.time_s[stop - 1])) for start, stop in ranges)
 
-    def without_moves(self, bad: Collection[int]) -> Observations:
-        keep = [m for m in range(self.n_moves) if m not in bad]
+    def without_moves_from(self, poses: Collection[int]) -> Observations:
+        """Without the moves that begin at these poses. Where moves were left out before, their numbers are others."""
+        keep = [m for m, (before, _) in enumerate(self.move_poses.tolist()) if before not in poses]
         ranges, unresolved = tuple(self.move_ranges[m] for m in keep), self.unresolved[keep]
         return replace(self, move_ranges=ranges, move_poses=self.move_poses[keep], unresolved=unresolved)
-
-    def moves_from(self, poses: Collection[int]) -> list[int]:
-        """The moves that begin at these poses. Where moves were left out before, their numbers are others."""
-        return [m for m, (before, _) in enumerate(self.move_poses.tolist()) if before in poses]
 
     @property
     def readings(self) -> FloatArray:
