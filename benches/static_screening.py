@@ -28,7 +28,8 @@ for noise, terms in TERMS.items():
         means = slow_changes.block_means(x)
         alone = means.beside(())
         # Rise per parameter of an exponential, a wave and a step.
-        more = [alone.deviance - means.refined(alone, kind).deviance for kind in slow_changes.KINDS]
+        refined = [means.refined(means.with_one_more(alone, kind)) for kind in slow_changes.KINDS]
+        more = [alone.deviance - one.deviance for one in refined]
         rise["slow change"].append(max(np.divide(more, slow_changes.PARAMETERS)))
         rise["two levels"].append(two_levels.two_levels(x, 1.0).rise)
     for name, limit in limits.items():

@@ -112,11 +112,11 @@ def test_a_step_is_found_and_does_not_become_a_random_walk(quiet):
     assert noise.axes[0].value("K") == pytest.approx(clean.axes[0].value("K"), rel=0.15)
 
 
-@pytest.mark.parametrize("lasts", [1.0, 0.12])
-def test_a_step_too_small_for_its_edge_to_show_is_found_in_means_and_leaves_no_walk(lasts):
-    # A fifth of the noise of a reading, for good or for an eighth of the log: it shows in thousands of readings alone.
+@pytest.mark.parametrize(("size", "lasts"), [(0.02, 1.0), (0.03, 0.12)])
+def test_a_step_too_small_for_its_edge_to_show_is_found_in_means_and_leaves_no_walk(size, lasts):
+    # A fifth of the noise of a reading for good, or a third for an eighth of the log: means of thousands show it.
     n, at = 65_536, np.arange(65_536) / 65_536
-    x = in_time(np.random.default_rng(3), n, RATE, N=1e-2) + 0.02 * ((at > 0.37) & (at < 0.37 + lasts))
+    x = in_time(np.random.default_rng(3), n, RATE, N=1e-2) + size * ((at > 0.37) & (at < 0.37 + lasts))
     noise = identify_noise(x, RATE)
     ends = [end for end in (0.37, 0.37 + lasts) if end < 1.0]
     assert noise.breaks_s == pytest.approx([end * n / RATE for end in ends], abs=0.01 * n / RATE)

@@ -36,9 +36,9 @@ TRIED = (TIMES, 1.0 / CYCLES, np.arange(SHORTEST, MEANS - SHORTEST + 1) / MEANS)
 """Time constants, periods and instants that are tried, in lengths of the log."""
 SIZES = (1, 2, 1)
 """Number of sizes of a change of each kind."""
-PARAMETERS = (2, 3, 3)
+PARAMETERS = (2, 3, 4)
 """Size and time of an exponential; amplitude, phase and period of a wave; size of a step and its instant, which fits
-chance as two parameters do or more, because the likelihood has no curvature along it (Ninomiya 2005)."""
+chance as three parameters do, because the likelihood has no curvature along it (Ninomiya 2005)."""
 MOST = 4
 """Most changes of one log: sums of more exponentials cannot be told apart."""
 PLAUSIBLE = float(np.log(MEANS))
@@ -101,9 +101,11 @@ def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) ->
         return [()]
     found = [means.beside(())]
     while len(found) <= MOST:
-        more = [means.refined(found[-1], kind) for kind in KINDS]
-        best = min(more, key=lambda one: one.cost(PLAUSIBLE))
-        if not best.cost(PLAUSIBLE) < found[-1].cost(PLAUSIBLE):
+        more = [means.with_one_more(found[-1], kind) for kind in KINDS]
+        # Times between those that are tried raise a likelihood that is high at one of these.
+        worth = [one for one in more if one.cost(0.5 * PLAUSIBLE) < found[-1].cost(0.5 * PLAUSIBLE)]
+        best = min([found[-1], *map(means.refined, worth)], key=lambda one: one.cost(PLAUSIBLE))
+        if best is found[-1]:
             break
         found.append(best)
     duration_s = len(x) / rate_hz
@@ -239,9 +241,8 @@ class Means:
         """(times, sizes, m) coefficients of the changes of each kind that are tried."""
         return [self.transformed(np.stack([self.shape(time, kind) for time in TRIED[kind]])) for kind in KINDS]
 
-    def refined(self, known: Beside, kind: int) -> Beside:
-        """The ``known`` changes and one more: first the best of those tried, beside the noise as it was, then all times
-        and the noise in turn while the deviance falls."""
+    def with_one_more(self, known: Beside, kind: int) -> Beside:
+        """The ``known`` changes and one more, the best of those tried beside the noise as it was."""
         across = np.linalg.qr((self.columns(known.times) / known.sigma).T)[0]
         tried = self.tried[kind] / known.sigma
         largest = np.linalg.norm(tried, axis=2).max()
@@ -250,13 +251,15 @@ class Means:
         is_seen = np.abs(np.diagonal(left, axis1=1, axis2=2)).min(axis=1) > NOTHING * largest
         gain = is_seen * np.sum((self.coefficients / known.sigma @ tried) ** 2, axis=1)
         more = [[*known.times, (float(time), kind)] for time in TRIED[kind]]
-        found = self.beside(more[int(np.argmax(gain * [_are_apart(times) for times in more]))])
-        while found.deviance < known.deviance - 0.5 * PLAUSIBLE * PARAMETERS[kind]:
+        return self.beside(more[int(np.argmax(gain * [_are_apart(times) for times in more]))])
+
+    def refined(self, found: Beside) -> Beside:
+        """The changes ``found`` with times and noise fitted in turn while the deviance falls."""
+        while True:
             better = self.beside(self._times(found))
             if better.deviance > found.deviance - CONVERGED:
                 return min(better, found, key=lambda one: one.deviance)
             found = better
-        return found
 
     def _times(self, found: Beside) -> list[Time]:
         """The most likely times near those ``found``, beside its noise."""
