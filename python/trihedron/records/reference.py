@@ -88,8 +88,9 @@ class FitToReference(Plain):
     """One sensor fitted to a reference: ``truth in the reference's body = S raw + b``.
 
     ``covariance`` (12, 12) as a calibration's; ``rms`` [SI] of the residuals of samples, low-pass filtered to the
-    compared band (up to ``band_hz``), ``rms_held_out`` cross-validated; ``n_rows`` windows of three components,
-    ``n_left_out`` excluded as outliers; ``widened`` the excess of the scatter between blocks of time over the noise.
+    compared band (up to ``band_hz``), ``rms_held_out`` cross-validated (NaN in a short log); ``n_rows`` residuals of
+    three components, ``n_left_out`` excluded as outliers; ``widened`` the excess of the scatter between blocks of time
+    over the noise (an accelerometer's).
     """
 
     S: FloatArray

@@ -78,9 +78,8 @@ def errors_beside(references: Sequence[AgainstReference]) -> str:
         worst = max(replays, key=lambda one: one.error_rad)
         angle = plain_number(degrees_from_radians(worst.error_rad))
         said.append(f"attitude {angle}° after {worst.horizon_s:g} s by the gyro alone")
-    elif references:
-        rate = max(one.gyroscope.rms_held_out for one in references)
-        said.append(f"rate in motion {plain_number(degrees_from_radians(rate), 3)} °/s")
+    elif rates := [one.gyroscope.rms_held_out for one in references if np.isfinite(one.gyroscope.rms_held_out)]:
+        said.append(f"rate in motion {plain_number(degrees_from_radians(max(rates)), 3)} °/s")
     forces = [one.accelerometer.rms_held_out for one in references if one.accelerometer is not None]
     if forces:
         said.append(f"acceleration in motion {in_mm_s2(max(forces))}")
