@@ -34,7 +34,7 @@ class Drawn:
     def chosen(self, n: int) -> FloatArray:
         """(n, f) draws of equal weight."""
         at = np.searchsorted(np.cumsum(self.weights), (np.arange(n) + 0.5) / n)
-        return self.points[at.clip(max=len(self.points) - 1)]
+        return np.asarray(self.points[at.clip(max=len(self.points) - 1)])
 
 
 def drawn_from(
@@ -49,7 +49,7 @@ def drawn_from(
     first, proposals = spread, []
     found = Drawn(np.empty((0, len(middle))), np.empty(0), np.empty(0), -np.inf)
     for drawn in range(1, MOST_ROUNDS + 1):
-        root = np.linalg.cholesky(spread)
+        root = np.asarray(np.linalg.cholesky(spread), dtype=np.float64)
         proposals.append((middle, root))
         widths = np.sqrt(TAILS / rng.chisquare(TAILS, size=(PROPOSED, 1)))
         new = middle + widths * rng.normal(size=(PROPOSED, len(middle))) @ root.T

@@ -81,8 +81,7 @@ def _solve(
         r = (target - X @ theta) * weight[:, None]
         filters = [_autoregression(r[:, axis], index, used, order) for axis in range(3)]
         white, at = _whitening(index, used, filters)
-        white = white * np.repeat(weight, 3)
-        Z, y = white @ flat, white @ target.ravel()
+        Z, y = white @ (flat * np.repeat(weight, 3)[:, None]), white @ (target * weight[:, None]).ravel()
         theta = _least_squares(Z, y)
     left = y - Z @ theta
     variance = float(left @ left) / max(len(left) - p - 3 * order, 1)
@@ -98,7 +97,7 @@ def _solve(
     widened = float(np.median(wide))
     spread = float(np.mean(np.log(np.maximum(jackknife, predicted)[is_known]))) if np.any(is_known) else np.inf
     covariance = variance * inverse * np.outer(wide, wide)
-    influence = (white.T @ (Z @ inverse)).T.reshape(p, k, 3)
+    influence = (white.T @ (Z @ inverse)).T.reshape(p, k, 3) * weight[:, None]
     return spread, Solution(theta, covariance, influence, residual, used, widened, held_out)
 
 
