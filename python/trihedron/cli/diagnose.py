@@ -65,6 +65,7 @@ def diagnose(
     from trihedron.api import diagnosing
     from trihedron.files.calibration import diagnosis_document
     from trihedron.report.diagnosis import diagnosis_report, first_screen
+    from trihedron.report.numbers import how_many
 
     with progress("diagnosing") as notify:
         result = diagnosing.diagnose(
@@ -79,11 +80,12 @@ def diagnose(
         )
     document = diagnosis_report(result, str(against or calibration or ""), str(improved or ""))
     results.show(document, first_screen(result))
-    results.write(document, lambda: diagnosis_document(result))
+    doubts = sum(finding.severity.value == "warning" for finding in result.findings)
+    counted = f" ({how_many(doubts, 'warning')})" if doubts else ""
+    more = f"Every candidate, both models and findings{counted}: --full; pictures before and after: --report FILE.html."
+    results.write(document, lambda: diagnosis_document(result), more)
     if improved is not None and against is not None:
         _improve(against, result, improved, force=results.force)
-    if not results.full and results.report is None:
-        _point_to_more(result)
     if known is not None:
         from trihedron.api.applying import doubted
 
@@ -121,12 +123,3 @@ def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -
         )
     write_scenario(better.text, path, overwrite=force)
     say(f"improved scenario: {path}")
-
-
-def _point_to_more(result: DiagnosisResult) -> None:
-    """Point to the full report, with the number of warnings."""
-    from trihedron.records import Severity
-
-    doubts = sum(finding.severity is Severity.WARNING for finding in result.findings)
-    counted = f" ({doubts} warning{'s' if doubts > 1 else ''})" if doubts else ""
-    say(f"Every candidate, both models and findings{counted}: --full; pictures before and after: --report FILE.html.")

@@ -224,16 +224,19 @@ def _evidence(effect: AcceptedEffect) -> str:
     if effect.share is not None and effect.share > LEAST_SHARE:
         words += f"; by itself it explains {plain_number(100.0 * effect.share, 2)} % of the misfit"
     if effect.held_out:
-        words += "; cross-validated, " + _improvement(effect.held_out[0])
+        first, *others = effect.held_out
+        chi2 = f"{plain_number(first.chi2_per_dof_before)} → {plain_number(first.chi2_per_dof_after)}"
+        words += f"; cross-validated, {_improvement(first)} (predictive χ²/dof {chi2})"
+        words += "".join(f"; {_improvement(held)}" for held in others if held.rms_before > 0.0)
     return words + "."
 
 
 def _improvement(held: HeldOut) -> str:
-    chi2 = f"predictive χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
+    """A domain with its rms without and with an effect, where it has one."""
     if held.rms_before == held.rms_after == 0.0:
-        return f"{quantity(held)} {chi2}"
+        return quantity(held)
     before, after = (size_in_words(rms, held.unit) for rms in (held.rms_before, held.rms_after))
-    return f"{quantity(held)} from {before} to {after} rms ({chi2})"
+    return f"{quantity(held)} {before} → {after} rms"
 
 
 def _remaining(diagnosis: Diagnosis) -> str:
