@@ -67,7 +67,7 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Bars at ``x`` from 0 (or ``base``) to ``y``, ``width`` in data units; ``is_across``: at ``y`` along ``x``."""
+    """Bars at ``x`` from 0 to ``y``, ``width`` in data units."""
 
     x: FloatArray
     y: FloatArray
@@ -75,8 +75,6 @@ class Bars:
     said: Sequence[str]
     name: str = ""
     colour: Colour = "c1"
-    base: FloatArray | None = None
-    is_across: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +148,7 @@ def _xs(mark: Mark) -> list[FloatArray]:
     if isinstance(mark, Points):
         return _with_bars(mark.x, mark.sigma if mark.is_across else None)
     if isinstance(mark, Bars):
-        return _from_base(mark.x, mark) if mark.is_across else [mark.x - mark.width / 2, mark.x + mark.width / 2]
+        return [mark.x - mark.width / 2, mark.x + mark.width / 2]
     return [np.array([mark.x])] if isinstance(mark, Level) and mark.x is not None else []
 
 
@@ -160,7 +158,7 @@ def _ys(mark: Mark) -> list[FloatArray]:
     if isinstance(mark, Line):
         return [mark.y]
     if isinstance(mark, Bars):
-        return [mark.y] if mark.is_across else _from_base(mark.y, mark)
+        return [mark.y, np.zeros(1)]
     if isinstance(mark, Band):
         return [mark.lower, mark.upper]
     return [np.array([mark.y])] if isinstance(mark, Level) and mark.y is not None else []
@@ -171,10 +169,6 @@ def _with_bars(values: FloatArray, sigma: FloatArray | None) -> list[FloatArray]
         return [values]
     bar = np.where(np.isfinite(sigma), sigma, 0.0)
     return [values - bar, values + bar]
-
-
-def _from_base(ends: FloatArray, mark: Bars) -> list[FloatArray]:
-    return [ends, np.zeros(1) if mark.base is None else mark.base]
 
 
 def around_zero(values: FloatArray) -> tuple[float, float]:

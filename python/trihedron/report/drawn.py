@@ -240,21 +240,15 @@ def _shared(texts: Sequence[str]) -> int:
 
 
 def _bars(mark: Bars, at: Places) -> str:
-    base = np.zeros(len(mark.x)) if mark.base is None else mark.base
     half = mark.width / 2
-    if mark.is_across:
-        left, right, foot, top = at.x(base), at.x(mark.x), at.y(mark.y - half), at.y(mark.y + half)
-    else:
-        left, right, foot, top = at.x(mark.x - half), at.x(mark.x + half), at.y(base), at.y(mark.y)
-    ends = np.column_stack([left, foot, top, right])
+    ends = np.column_stack([at.x(mark.x - half), at.y(np.zeros(len(mark.x))), at.y(mark.y), at.x(mark.x + half)])
     seen = np.flatnonzero(np.isfinite(ends).all(axis=1))
     if not len(seen):
         return ""
-    way = " across" if mark.is_across else ""
     places = "".join(f"M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z" for a, f, t, b in ends[seen])
     first, last = shared_ends(mark.said)
     return (
-        f'<path class="area {mark.colour}{way}" data-a="{escape(first)}" data-z="{escape(last)}" '
+        f'<path class="area {mark.colour}" data-a="{escape(first)}" data-z="{escape(last)}" '
         f'data-t="{_tips(mark.said, seen, first, last)}" d="{places}"/>'
     )
 

@@ -181,11 +181,7 @@ def _draw(axis: Axes, mark: Mark) -> None:
             fillstyle="none" if mark.is_hollow else "full", label=mark.name or None,
         )  # fmt: skip
     elif isinstance(mark, Bars):
-        base = 0.0 if mark.base is None else mark.base
-        if mark.is_across:
-            axis.barh(mark.y, mark.x - base, mark.width, left=base, color=colour, label=mark.name or None)
-        else:
-            axis.bar(mark.x, mark.y - base, mark.width, bottom=base, color=colour, label=mark.name or None)
+        axis.bar(mark.x, mark.y, mark.width, color=colour, label=mark.name or None)
     elif isinstance(mark, Span):
         # Other colours than the pale shade are made transparent, so that curves stay visible.
         alpha = 1.0 if mark.colour == "shade" else 0.35

@@ -96,7 +96,6 @@
           const text = a + one + z, [x, y, v, w] = n.slice((is("area") ? 5 : 3) * k);
           /* A bar is pointed at anywhere along its length. */
           if (!is("area")) dots.push([x, y, text, 0, 0, p]);
-          else if (is("across")) dots.push([0, (y + v) / 2, text, Infinity, Math.abs(v - y) / 2]);
           else dots.push([(x + w) / 2, 0, text, Math.abs(w - x) / 2, Infinity]);
         });
       }
