@@ -10,7 +10,7 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.quantiles import MAD_TO_SIGMA, median, quantiles
 from trihedron.read.clock.losses import ahead, block_rows, lateness, track
-from trihedron.read.clock.period import STALL_STEPS, Period, find_period
+from trihedron.read.clock.period import STALL_STEPS, find_period
 from trihedron.records.sampling import TimestampKind
 
 FEWEST_ROWS = 100
@@ -26,7 +26,7 @@ TAKEN_BACK = 0.02
 """Largest share of blocks whose earliest timestamp moves back by a whole period; with an even clock none does."""
 MOST_BLOCKS = 1 << 18
 """Largest number of blocks of a section to whose earliest timestamps the clock is fitted."""
-CLOSE_PIECES = 60
+PIECES = 60
 """Pieces of a log in which a drifting rate is followed; thermal drift takes minutes."""
 
 
@@ -65,39 +65,27 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     if n < FEWEST_ROWS or not time_s[-1] > time_s[0]:
         return None
     found = find_period(time_s)
-    if counter is None and found.grid_s > 0.0:
-        numbers = numbers_of_rounded(time_s, found.grid_s)
-        numbered = None if numbers is None else _clock_of(time_s, numbers, found)
-        if numbered is not None and numbered.kind is not TimestampKind.IRREGULAR:
-            return numbered
-    return _clock_of(time_s, counter, found)
-
-
-def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> EvenClock:
-    n, period, is_seen = len(time_s), found.period_s, found.is_seen
+    period, is_seen = found.period_s, found.is_seen
     # One buffer for lateness, clock and error in turn: a second one takes memory and time for a long log.
     room = _core.new_array(n, 1).reshape(-1)
     width = block_rows(time_s, period, found.coherence)
     if counter is not None:
         tick, pauses, moved_back, is_seen = counter, np.zeros(0, np.int64), 0.0, True
-        period = _long_run(time_s, counter)
+        period = float((time_s[-1] - time_s[0]) / max(counter[-1] - counter[0], 1))
     else:
-        period, tick, pauses, moved_back = track(time_s, period, width, is_seen, room)
+        tick, pauses, moved_back = track(time_s, period, width, is_seen, room)
     # Rounding to a grid moves a difference of two timestamps by its step / √6 rms, at any lag.
     rounding = found.grid_s / np.sqrt(6.0) if is_seen and found.grid_s < period else 0.0
     unseen = max(UNSEEN * period, rounding)
-    even, mean_period, sigma, drifts = _lay(time_s, tick, period, pauses, (width, unseen), False, room)
+    even, mean_period, sigma = _lay(time_s, tick, period, pauses, (width, unseen), False, room)
     error = _error(time_s, even)
-    if drifts:
-        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, (width, unseen), False, room, CLOSE_PIECES)
-        error = _error(time_s, even)
     growth = _growth(error, pauses, unseen)
     if moved_back > TAKEN_BACK or growth > GROWTH or (not is_seen and growth > 0.5 * GROWTH):
         return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
     kind = _kind(error, period, found.grid_s)
     if kind is not TimestampKind.LATE:
         # For two-sided errors the clock is at their middle, not at their edge.
-        even, mean_period, sigma, _ = _lay(time_s, tick, period, pauses, (width, unseen), True, room, CLOSE_PIECES)
+        even, mean_period, sigma = _lay(time_s, tick, period, pauses, (width, unseen), True, room)
         error = _error(time_s, even)
     rms = _core.errors_deviation(error)
     even = _error(time_s, error)
@@ -110,18 +98,6 @@ def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:
     return even
 
 
-def _long_run(time_s: FloatArray, tick: IntArray) -> float:
-    """Period [s] from timestamps and ticks: a line through the earliest timestamps of about 300 blocks, three times."""
-    period = float((time_s[-1] - time_s[0]) / max(tick[-1] - tick[0], 1))
-    width = max(len(time_s) // 300, 8)
-    for _ in range(3):
-        late = time_s - period * tick
-        at = _core.earliest_timestamps(late, width)
-        slope = np.polyfit(tick[at] - tick[at[0]], late[at], 1)[0] if len(at) > 2 else 0.0
-        period += float(slope)
-    return period
-
-
 def _lay(
     time_s: FloatArray,
     tick: IntArray,
@@ -130,10 +106,9 @@ def _lay(
     least_of: tuple[int, float],
     through_middle: bool,
     room: FloatArray,
-    pieces: int = 12,
-) -> tuple[FloatArray, float, float, bool]:
+) -> tuple[FloatArray, float, float]:
     """The even clock (n,) fitted to the earliest timestamps, or to the middle of all; its mean period over the longest
-    section and the standard error of that; whether its rate drifts, which is then followed in ``pieces``.
+    section and the standard error of that. A rate that drifts is followed in ``PIECES``.
 
     ``least_of``: rows of a block, and deviation [s] below which the rate does not drift. The clock is written into
     ``room`` (n,)."""
@@ -142,7 +117,7 @@ def _lay(
     # Each section of the clock overwrites the lateness from which it is computed.
     even = late
     edges = np.concatenate([[0], pauses + 1, [len(late)]])
-    sigma, longest, drifts, slope = np.inf, 0, False, 0.0
+    sigma, longest, slope = np.inf, 0, 0.0
     for a, b in pairwise(edges):
         piece = late[a:b]
         # A clock drifts over minutes: more blocks than this only take memory.
@@ -169,8 +144,7 @@ def _lay(
         curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), unseen)
         course = None
         if curved and len(y) >= 24:
-            drifts = True
-            course = _core.running_median(left, min(max(len(y) // pieces, 5), 101) | 1)
+            course = _core.running_median(left, min(max(len(y) // PIECES, 5), 101) | 1)
         _core.lay_even_clock(tick[a:b], line, x0, scale, period, even[a:b])
         if course is not None:
             for p in _parts(a, b):
@@ -181,7 +155,7 @@ def _lay(
             # Delays of neighbouring blocks are correlated: four count as one.
             sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
     digits = float(np.spacing(max(abs(time_s[0]), abs(time_s[-1])))) / max(int(tick[-1] - tick[0]), 1)
-    return even, period + slope, float(np.hypot(sigma, digits)), drifts
+    return even, period + slope, float(np.hypot(sigma, digits))
 
 
 def _parts(first: int, stop: int) -> Iterator[slice]:
@@ -205,55 +179,18 @@ def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
     return typical(far) / max(typical(near), unseen**2)
 
 
-def _range(error: FloatArray) -> float:
-    """Width that contains all but 2 % of the errors, because rows next to a loss may be on its wrong side."""
-    low, high = quantiles(error[:: max(len(error) // 100_000, 1), None], [0.01, 0.99])[:, 0]
-    return float(high - low)
-
-
 def _kind(error: FloatArray, period: float, grid: float) -> TimestampKind:
     """Kind of timestamps from their errors (n,) [s] relative to the even clock."""
     probe = error[:: max(len(error) // 100_000, 1)]
-    low, middle, high = quantiles(probe[:, None], [0.002, 0.5, 0.998])[:, 0]
+    low, early, middle, late, high = quantiles(probe[:, None], [0.002, 0.01, 0.5, 0.99, 0.998])[:, 0]
     rms = float(np.std(probe))
     if rms < EXACT * period:
         return TimestampKind.EXACT
-    if 0.0 < grid < 1.3 * period and _range(error) < 1.3 * grid:
+    # All but 2 % of the errors: rows next to a loss may be on its wrong side.
+    if 0.0 < grid < 1.3 * period and late - early < 1.3 * grid:
         return TimestampKind.ROUNDED
     # One-sided errors have a sharp early edge and a late tail; or samples arrive in packets.
     together = _core.errors_falls(error, 0.7 * period) / max(len(error) - 1, 1)
     if high - middle > 2.0 * (middle - low) or together > 0.02 or high - low > 1.0 * period:
         return TimestampKind.LATE
     return TimestampKind.SCATTERED
-
-
-# Samples numbered by the steps of their timestamps, where rounding to a grid is the only error.
-
-COARSEST = 1.0 / 3.0
-"""Coarsest grid, in periods, on which a step with both ends rounded determines its number of samples."""
-ROOM = 0.36
-"""Largest deviation of a step from whole periods, in periods: the coarsest grid, and a margin for other errors."""
-SINGLE = 1.5
-"""Multiple of the median step above which a step contains a lost sample."""
-COUNTED = 5.5
-"""Longest steps checked, in periods: in a pause the drift of the clock is too large."""
-
-
-def numbers_of_rounded(time_s: FloatArray, grid_s: float) -> IntArray | None:
-    """(n,) numbers of the samples, lost ones counted, where every step is close to whole periods; else ``None``.
-
-    With T = 9.996 ms on a grid of 1 ms one step in 250 is a millisecond short: a phase sum over a window cannot
-    distinguish this pattern from a clock of another period with lost samples; the steps themselves can.
-    """
-    step = np.diff(time_s)
-    middle = float(np.median(step))
-    if not 0.0 < grid_s <= COARSEST * middle:
-        return None
-    period = float(np.mean(step[step < SINGLE * middle]))
-    count = np.rint(step / period)
-    if count.min() < 1.0 or count.max() > np.iinfo(np.int32).max:
-        return None
-    miss = np.abs(step - count * period)
-    if np.any(miss[count < COUNTED] > ROOM * period):
-        return None
-    return np.concatenate([[0], np.cumsum(count)]).astype(np.int64)

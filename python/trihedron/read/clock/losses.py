@@ -51,26 +51,16 @@ def ahead(values: FloatArray, reach: int) -> FloatArray:
 
 def track(
     time_s: FloatArray, period: float, width: int, is_seen: bool, room: FloatArray
-) -> tuple[float, IntArray, IntArray, float]:
-    """Period, tick of every row, pauses, and the share of blocks that moved back by a period; ``room`` (n,): buffer.
+) -> tuple[IntArray, IntArray, float]:
+    """Tick of every row, pauses, and the share of blocks that moved back by a period; ``room`` (n,): buffer.
 
     The earliest timestamp of every block, stalls of the link excluded, shifts by whole periods where samples are lost,
-    and slowly if the period is slightly wrong. Without ``is_seen`` the period is corrected from first and last blocks.
+    and slowly if the period is slightly wrong. Without ``is_seen`` none is lost outside pauses.
     """
     n = len(time_s)
     pauses = _core.steps_above(time_s, PAUSE_STEPS * period)
     edges = np.concatenate([[0], pauses + 1, [n]])
     reach = STALL_STEPS // width + 1
-    for _ in range(0 if is_seen else 3):
-        late = lateness(time_s, None, period, room)
-        slopes, weights = [], []
-        for a, b in pairwise(edges):
-            if b - a >= 4 * width:
-                at = _core.earliest_timestamps(late[a:b], width) + a
-                slopes.append(float((late[at[-1]] - late[at[0]]) / (at[-1] - at[0])))
-                weights.append(b - a)
-        if slopes:
-            period += float(np.average(slopes, weights=weights))
     late = lateness(time_s, None, period, room)
     late /= period
     # 32-bit integers where the ticks allow it take half the memory.
@@ -87,12 +77,12 @@ def track(
         level = late[max(a, k + 1 - width) : k + 1].min()
         lost[k + 1] += max(round(float(late[k + 1 : k + 1 + STALL_STEPS].min() - level)), 0)
     if not lost.any():
-        return period, np.arange(n, dtype=lost.dtype), pauses, back / max(blocks, 1)
+        return np.arange(n, dtype=lost.dtype), pauses, back / max(blocks, 1)
     # The ticks overwrite the losses, to save memory for a log of 1e8 rows.
     lost += np.int8(1)
     lost[0] -= 1
     tick = np.cumsum(lost, out=lost)
-    return period, tick, pauses, back / max(blocks, 1)
+    return tick, pauses, back / max(blocks, 1)
 
 
 def _count_losses(late: FloatArray, width: int, reach: int, lost: IntArray) -> tuple[int, int]:
