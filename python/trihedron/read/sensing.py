@@ -160,34 +160,19 @@ def judge_gyroscope(
     unit = nearest if stated is None else stated
     factor = turning.factor(unit)
     percent, correlation = turning.percent, turning.correlation
-    fitting = next((one for one in turning.candidates if turning.fits(one)), None)
     if turning.fits(unit) and stated is not None:
         found = _statement("gyro", unit, given)
     elif turning.fits(unit):
         found = Finding.of(
-            "unit-detected",
-            "gyro-by-turning",
-            unit=unit.value,
-            factor=factor,
-            percent=percent,
-            correlation=correlation,
-        )
-    elif stated is None:
-        found = Finding.of(
-            "unit-contradicted",
-            "gyro-no-unit",
-            unit=unit.value,
-            factor=factor,
-            right_hz=turning.rate_hz / factor,
-            percent=percent,
-            correlation=correlation,
+            "unit-detected", "gyro-by-turning", unit=unit.value, factor=factor, percent=percent, correlation=correlation
         )
     else:
+        fitting = next((one.value for one in turning.candidates if turning.fits(one)), "")
         found = Finding.of(
             "unit-contradicted",
-            "gyro-by-turning",
-            has_fitting=fitting is not None,
-            fitting="" if fitting is None else fitting.value,
+            "gyro-no-unit" if stated is None else "gyro-by-turning",
+            has_fitting=bool(fitting),
+            fitting=fitting,
             is_given=given is not None,
             unit=unit.value,
             factor=factor,

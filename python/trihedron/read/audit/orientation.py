@@ -79,38 +79,20 @@ def audit_orientation(sensors: Sensors, rate_hz: float) -> list[Finding]:
 def _finding(sensor: str, change: Change, sensors: Sensors) -> Finding:
     # One of the moves beside it may hide it: one about the vertical, or about an axis that keeps its sign.
     from_s, to_s = (sensors.time_s[min(at, len(sensors.time_s) - 1)] for at in change.between)
-    sample = sum(change.between) // 2
+    sample, ratio, axes = sum(change.between) // 2, change.ratio, change.axes
     where = sensors.place(sample)
-    axes, ratio = change.axes, change.ratio
     if not axes:
         return Finding.of(
-            "axes-changed",
-            "range",
-            sensor=sensor,
-            from_s=from_s,
-            to_s=to_s,
-            where=where,
-            sample=sample,
-            ratio=ratio,
+            "axes-changed", "range", sensor=sensor, from_s=from_s, to_s=to_s, where=where, sample=sample, ratio=ratio,
             inverse=1.0 / ratio,
-        )
+        )  # fmt: skip
     other, others = "accelerometer", change.of_accelerometer
     if others and len(others) < len(axes):
         sensor, axes, other, others = other, others, sensor, axes
     return Finding.of(
-        "axes-changed",
-        sensor=sensor,
-        from_s=from_s,
-        to_s=to_s,
-        where=where,
-        sample=sample,
-        axes=axes,
-        is_scaled=abs(math.log(ratio)) > ALIKE,
-        ratio=ratio,
-        other=other,
-        has_others=bool(others),
-        others=others,
-    )
+        "axes-changed", sensor=sensor, from_s=from_s, to_s=to_s, where=where, sample=sample, axes=axes, ratio=ratio,
+        is_scaled=abs(math.log(ratio)) > ALIKE, other=other, has_others=bool(others), others=others,
+    )  # fmt: skip
 
 
 def _scales(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float) -> list[float]:
