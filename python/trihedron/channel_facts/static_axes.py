@@ -12,10 +12,10 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray
 from trihedron.channel_facts.low_pass import Spectrum, low_passes, undisturbed
 from trihedron.channel_facts.pooled import Pooled, pooled_logarithm, robust_poses
-from trihedron.channel_facts.quiet import Windows, look
+from trihedron.channel_facts.quiet import look
 from trihedron.errors import InputError
 from trihedron.probability import RARE_ALARM, chdtri
-from trihedron.ranges import Range, ranges_of
+from trihedron.ranges import merged, ranges_of
 from trihedron.records.channel_facts import LowPass
 from trihedron.transforms import cosine_transform
 
@@ -262,7 +262,8 @@ def find_low_passes(sensors: dict[str, FloatArray], rate_hz: float) -> dict[str,
     windows = look(sensors, rate_hz, in_a_row=IN_A_ROW)
     if windows is None:
         return {}
-    stretches = _stretches(windows)
+    # Consecutive windows are one interval.
+    stretches = merged((a, a + windows.length) for a in windows.start[windows.quiet].tolist())
     found = {}
     for name, readings in sensors.items():
         try:
@@ -271,13 +272,3 @@ def find_low_passes(sensors: dict[str, FloatArray], rate_hz: float) -> dict[str,
             continue  # fewer than 32 readings in a row
         found[name] = tuple(low_passes([axis.spectrum for axis in axes], rate_hz))
     return found
-
-
-def _stretches(windows: Windows) -> list[Range]:
-    """Ranges of consecutive quiet windows."""
-    follows = np.diff(windows.start) == windows.length
-    number = np.concatenate([[0], np.cumsum(np.where(follows, 1, 2))])
-    is_quiet = np.zeros(int(number[-1]) + 1, dtype=np.bool_)
-    is_quiet[number[windows.quiet]] = True
-    first_row = dict(zip(number.tolist(), windows.start.tolist(), strict=True))
-    return [(first_row[a], first_row[b - 1] + windows.length) for a, b in ranges_of(is_quiet)]

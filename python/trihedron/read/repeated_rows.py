@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.probability import bdtrc
-from trihedron.read.clock.base import PART, Clock
+from trihedron.read.clock.base import Clock
 from trihedron.read.clock.rate import steps_of
 from trihedron.read.columns import Columns
 from trihedron.read.table import Table
@@ -24,6 +24,8 @@ RARE = 0.01
 mean by a hundredth of an LSB at most."""
 FIRST = 1 << 16
 """Samples at the start of a log in which it shows that a program reads faster than the sensor measures."""
+PART = 1 << 20
+"""Rows with timestamps of their own that show how often readings repeat by chance."""
 LAGS = 8
 """Distances between rows whose equality is counted, beyond the longest run of repeated rows."""
 

@@ -1,6 +1,6 @@
 """The log as short blocks of all channels, on which the whole segmentation works."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,11 +79,12 @@ class BlockSums:
             probe.append(triad[first :: self.stride].copy())
         self.n += len(triads[0])
 
-    def channels(self) -> Channels:
-        """All blocks so far."""
+    def channels(self, steps: FloatArray | None = None) -> Channels:
+        """All blocks so far; ``steps`` (c,) are the LSB where they are known."""
         mean, variance, is_valid = (np.concatenate([part[k] for part in self.parts]) for k in range(3))
-        steps = [adc_steps(np.concatenate(probe)) for probe in self.probes]
-        quantum = _not_below_arithmetic(np.concatenate(steps), mean)
+        if steps is None:
+            steps = np.concatenate([adc_steps(np.concatenate(probe)) for probe in self.probes])
+        quantum = _not_below_arithmetic(steps, mean)
         gyroscope = np.repeat(self.is_gyroscope, 3)
         step_s, unknown = self.length / self.rate_hz, np.zeros(mean.shape)
         return Channels(self.length, step_s, mean, variance, is_valid, quantum, gyroscope, unknown)
@@ -105,16 +106,14 @@ def _blocks(triads: list[FloatArray], length: int) -> tuple[FloatArray, FloatArr
 
 def split_into_blocks(recording: Recording) -> Channels:
     """Block means and variances of every channel."""
-    length = block_length(recording.rate_hz)
-    triads = [a for a in (recording.accelerometer, recording.gyroscope) if a is not None]
-    mean, variance, is_valid = _blocks(triads, length)
-    step_s = length / recording.rate_hz
-    if len(mean):
-        gap = np.diff(recording.time_s, prepend=recording.time_s[0]) > step_s
-        is_valid &= ~gap[: len(mean) * length].reshape(-1, length).any(axis=1)
-    gyroscope = np.repeat([a is recording.gyroscope for a in triads], 3)
-    quantum = _not_below_arithmetic(recording.facts.steps, mean)
-    return Channels(length, step_s, mean, variance, is_valid, quantum, gyroscope, _at_limits(recording, mean, length))
+    blocks = BlockSums(recording)
+    blocks.add([a for a in (recording.accelerometer, recording.gyroscope) if a is not None])
+    whole = blocks.channels(recording.facts.steps)
+    is_valid, length = whole.is_valid, whole.length
+    if len(is_valid):
+        gap = np.diff(recording.time_s, prepend=recording.time_s[0]) > whole.step_s
+        is_valid &= ~gap[: len(is_valid) * length].reshape(-1, length).any(axis=1)
+    return replace(whole, at_limit=_at_limits(recording, whole.mean, length))
 
 
 def _at_limits(recording: Recording, mean: FloatArray, length: int) -> FloatArray:

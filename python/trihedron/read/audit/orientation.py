@@ -17,6 +17,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.channel_facts.turning import turning_of
 from trihedron.probability import LN_FAULT, MEDIAN_CHI2
+from trihedron.ranges import edges_of
 from trihedron.read.sensors import Sensors
 from trihedron.records import Finding
 
@@ -161,7 +162,7 @@ class Intervals:
         steps = np.arange(len(force) - 1)
         across = force[np.minimum(steps + 1 + reach, len(steps))] - force[np.maximum(steps - reach, 0)]
         is_steady = np.linalg.norm(across, axis=1) < STEADY * norm[1:]
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], is_steady, [False]]).astype(np.int8))).reshape(-1, 2)
+        edges = edges_of(is_steady)
         least = max(FEW, round(STEADY_S / self.step_s) - 2 * reach)
         return edges[edges[:, 1] - edges[:, 0] + 1 >= least]
 

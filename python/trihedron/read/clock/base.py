@@ -89,7 +89,7 @@ def build_clock(
         raw = never_set_back(raw, table, rows, findings)
     order = order_of_rows(raw, table, column, rows, findings) if steps.back else None
     if order is not None:
-        raw = in_order(raw, order, np.empty(len(order)))
+        raw = raw[order]
         rows = order if rows is None else rows[order]
     unit = time_unit(raw, named, given, wraps, witness, findings)
     scale = seconds_of(unit)
@@ -114,8 +114,6 @@ def build_clock(
 
 MAX_DISPLACEMENT = 64
 """Largest number of rows by which a packet may be late; a larger one means another recording."""
-PART = 1 << 20
-"""Rows of a long log that are processed together."""
 
 
 def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int) -> Words:
@@ -182,13 +180,6 @@ def _n_uneven(step: FloatArray, usual: float) -> int:
     return int(np.count_nonzero(np.abs(step - usual) > 0.5 * usual))
 
 
-def in_order(values: FloatArray, rows: npt.NDArray[np.signedinteger], out: FloatArray) -> FloatArray:
-    """Write ``values[rows]`` into ``out`` in parts, because indexing converts 32-bit row numbers to 64 bits."""
-    for start in range(0, len(rows), PART):
-        out[start : start + PART] = values[rows[start : start + PART]]
-    return out
-
-
 def order_of_rows(
     raw: FloatArray, table: Table, column: int, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> npt.NDArray[np.signedinteger] | None:
@@ -196,8 +187,7 @@ def order_of_rows(
 
     Raises ``ReadError`` when time runs backward as a whole or jumps back further than a packet may be late.
     """
-    starts = range(0, max(len(raw) - 1, 1), PART)
-    back = np.concatenate([start + np.flatnonzero(np.diff(raw[start : start + PART + 1]) < 0) for start in starts])
+    back = np.flatnonzero(np.diff(raw) < 0)
     if not len(back):
         return None
     first = int(back[0]) + 1
@@ -209,13 +199,7 @@ def order_of_rows(
             f"{table.label(column)} is not a time: turn the rows round or name another time column."
         )
     order = np.argsort(raw, kind="stable")
-    if len(raw) < np.iinfo(np.int32).max:
-        # Half the memory, for long logs.
-        order = order.astype(np.int32)
-    displaced = max(
-        int(np.max(np.abs(order[a : a + PART] - np.arange(a, min(a + PART, len(order))))))
-        for a in range(0, len(order), PART)
-    )
+    displaced = int(np.abs(order - np.arange(len(order))).max())
     if displaced > MAX_DISPLACEMENT:
         step = raw[back + 1] - raw[back]
         raise ReadError(
