@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.probability import LN_FAULT
 from trihedron.read.clock.rate import RESET, modulus_of, steps_of, usual_step
 from trihedron.read.clock.unit import Witness, seconds_of, time_unit
@@ -85,11 +85,8 @@ def build_clock(
             "choose another with --columns time=..., or --columns time=none with --rate."
         )
     raw, wraps = unwrap(raw, table, rows, findings) if steps.back else (raw, False)
-    if steps.back and not wraps:
-        raw = never_set_back(raw, table, rows, findings)
-    order = order_of_rows(raw, table, column, rows, findings) if steps.back else None
+    raw, order = forward(raw, table, column, rows, findings) if steps.back else (raw, None)
     if order is not None:
-        raw = raw[order]
         rows = order if rows is None else rows[order]
     unit = time_unit(raw, named, given, wraps, witness, findings)
     scale = seconds_of(unit)
@@ -144,68 +141,48 @@ def unwrap(
     return raw + np.cumsum(turns), True
 
 
-def never_set_back(
-    raw: FloatArray, table: Table, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
-) -> FloatArray:
-    """Timestamps that continue by a usual step where the clock was set back; as they are where rows are late.
-
-    Sorting gives late rows even steps; rows of a clock that was set back have them in the order of the file. An uneven
-    step is e times less likely than an even one, at least; timestamps of arrival that overtake one another have uneven
-    steps in either order.
-    """
-    step, usual = np.diff(raw), usual_step(raw)
-    back = np.flatnonzero(step < 0)
-    order = np.argsort(raw, kind="stable")
-    is_far = np.abs(order - np.arange(len(order))).max() > MAX_DISPLACEMENT
-    gain = _n_uneven(np.diff(raw[order]), usual) - _n_uneven(step, usual)
-    if is_far or gain < LN_FAULT:
-        return raw
-    lifts = np.zeros(len(raw))
-    lifts[back + 1] = usual - step[back]
-    findings.append(
-        Finding.of(
-            "time-backward",
-            "set",
-            count=len(back),
-            where=_place(table, rows, int(back[0]) + 1),
-            largest=-float(step.min()),
-            sample=back[0] + 1,
-        )
-    )
-    return raw + np.cumsum(lifts)
-
-
 def _n_uneven(step: FloatArray, usual: float) -> int:
     """Number of steps that are not the usual one, to half of it."""
     return int(np.count_nonzero(np.abs(step - usual) > 0.5 * usual))
 
 
-def order_of_rows(
+def forward(
     raw: FloatArray, table: Table, column: int, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
-) -> npt.NDArray[np.signedinteger] | None:
-    """Row numbers in order of the timestamps; ``None`` where rows are in order already.
+) -> tuple[FloatArray, IntArray | None]:
+    """Timestamps (n,) that go back here and there, in order, and the row numbers of that order where rows were late;
+    where the clock was set back it continues by a usual step, and rows stay as they are.
+
+    Sorting gives late rows even steps; rows of a clock that was set back have them in the order of the file. An uneven
+    step is e times less likely than an even one, at least; timestamps of arrival that overtake one another have uneven
+    steps in either order.
 
     Raises ``ReadError`` when time runs backward as a whole or jumps back further than a packet may be late.
     """
-    back = np.flatnonzero(np.diff(raw) < 0)
+    step = np.diff(raw)
+    back = np.flatnonzero(step < 0)
     if not len(back):
-        return None
-    first = int(back[0]) + 1
+        return raw, None
+    first, largest = int(back[0]) + 1, -float(step.min())
     place = _place(table, rows, first)
-    if len(back) > 0.5 * (len(raw) - 1):
+    if len(back) > 0.5 * len(step):
         raise ReadError(
-            f"{table.path}: time runs backward ({len(back)} of {len(raw) - 1} steps, first at {place}); "
+            f"{table.path}: time runs backward ({len(back)} of {len(step)} steps, first at {place}); "
             "the rows stand in reverse order or column "
             f"{table.label(column)} is not a time: turn the rows round or name another time column."
         )
-    order = np.argsort(raw, kind="stable")
+    order, usual = np.argsort(raw, kind="stable"), usual_step(raw)
     displaced = int(np.abs(order - np.arange(len(order))).max())
     if displaced > MAX_DISPLACEMENT:
-        step = raw[back + 1] - raw[back]
         raise ReadError(
-            f"{table.path}: the clock jumps back by {-float(step.min()):.6g} (in its own unit) at "
-            f"{_place(table, rows, int(back[np.argmin(step)]) + 1)}: two recordings in one file, or a clock that "
+            f"{table.path}: the clock jumps back by {largest:.6g} (in its own unit) at "
+            f"{_place(table, rows, int(np.argmin(step)) + 1)}: two recordings in one file, or a clock that "
             "was set; cut the file there."
         )
-    findings.append(Finding.of("time-backward", count=len(back), where=place, displaced_rows=displaced, sample=first))
-    return order
+    if _n_uneven(np.diff(raw[order]), usual) - _n_uneven(step, usual) < LN_FAULT:
+        said = Finding.of("time-backward", count=len(back), where=place, displaced_rows=displaced, sample=first)
+        findings.append(said)
+        return raw[order], order
+    lifts = np.zeros(len(raw))
+    lifts[back + 1] = usual - step[back]
+    findings.append(Finding.of("time-backward", "set", count=len(back), where=place, largest=largest, sample=first))
+    return raw + np.cumsum(lifts), None
