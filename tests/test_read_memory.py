@@ -168,3 +168,18 @@ def test_cats_tag_has_temperature_and_an_unusual_gyro_unit(real_data):
     assert recording.gyroscope_unit is RateUnit.MRAD_S
     assert finding(recording, "unit-assumed").severity is Severity.WARNING
     assert read_recording(path, gyroscope_unit="mrad/s").gyroscope_unit is RateUnit.MRAD_S
+
+
+@pytest.mark.parametrize("kind", ["frame", "parquet"])
+def test_words_of_a_frame_name_sensors_and_devices_as_those_of_a_text_do(tmp_path, kind):
+    rng = np.random.default_rng(1)
+    axes = dict(zip("xyz", rng.normal(size=(3, 800)), strict=True))
+    frame = pl.DataFrame({"t": np.repeat(np.arange(400) / 50.0, 2), "sensor": ["acc", "gyro"] * 400, **axes})
+    log = frame
+    if kind == "parquet":
+        log = tmp_path / "log.parquet"
+        frame.with_columns(note=pl.Series([["a"]] * 800)).write_parquet(log)
+    recording = read_recording(log, accelerometer_unit="counts", gyroscope_unit="counts")
+    np.testing.assert_array_equal(recording.accelerometer, frame.select("x", "y", "z").to_numpy()[::2])
+    assert recording.gyroscope.shape == (400, 3)
+    assert recording.rows_in_file == recording.rows_read + recording.rows_reported

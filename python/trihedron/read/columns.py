@@ -12,7 +12,7 @@ from trihedron.read.clock.unit import TICKS
 from trihedron.read.errors import ReadError
 from trihedron.read.names import ColumnName, parse_name
 from trihedron.read.table import Table
-from trihedron.read.unnamed import are_nanoseconds, by_values, is_force
+from trihedron.read.unnamed import by_values, forces_of, nanoseconds_beside
 from trihedron.records import Finding
 
 Sensor = Literal["accelerometer", "gyroscope"]
@@ -103,11 +103,12 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     else:
         meanings = said
     triads = {role: _ranked(meanings, role) for role in SENSORS}
-    if sensor is None and (forces := [t for t in triads["gyroscope"] if _is_force(table, meanings, triads, t)]):
-        triads["gyroscope"] = [triad for triad in triads["gyroscope"] if triad not in forces]
+    forces = forces_of(table, meanings, *triads.values()) if sensor is None else []
+    if forces:
         is_read, taken = not triads["accelerometer"], " ".join(map(table.label, forces[0]))
-        triads["accelerometer"] = triads["accelerometer"] or forces
         findings.append(Finding.of("columns-assumed", "force", taken=taken, is_accelerometer=is_read))
+        left = [triad for triad in triads["gyroscope"] if triad not in forces]
+        triads = {"accelerometer": triads["accelerometer"] or forces, "gyroscope": left}
     if not triads["accelerometer"] and triads["gyroscope"]:
         triads["accelerometer"] = _ranked(meanings, "translation")  # tx ty tz beside wx wy wz
     if not any(triads.values()):
@@ -250,15 +251,6 @@ def _ranked(meanings: Meanings, role: str) -> list[Triad]:
     return [] if best is None else [best, *(triad for triad in groups if triad != best)]
 
 
-def _is_force(table: Table, meanings: Meanings, triads: dict[Sensor, list[Triad]], triad: Triad) -> bool:
-    """Whether columns that are a gyro by the letter g alone are gravity by their values."""
-    meaning = meanings[triad[0]]
-    if meaning.unit or meaning.group.partition("|")[0].split()[-1:] != ["g"]:
-        return False
-    time = next((i for i, one in meanings.items() if one.role == "time"), None)
-    return is_force(table, triad, next(iter(triads["accelerometer"]), None), time)
-
-
 def _unit(table: Table, meanings: Meanings, sensor: str, triad: Triad) -> str:
     """The unit of a sensor: from the names, else from a remark above the table."""
     units = (meanings[i].unit for i in triad if meanings[i].role == sensor and meanings[i].unit)
@@ -273,7 +265,7 @@ def _clock_columns(table: Table, meanings: Meanings, said: Meanings, mapping: st
     # Or a constant.
     times = [i for i in times if i in said or table.columns[i][0] != table.columns[i][-1]] or times
     time = max(times, key=lambda i: (meanings[i].rank, -i), default=None)
-    found: dict[str, Any] = {"nanoseconds": _nanoseconds_beside(table, time)}
+    found: dict[str, Any] = {"nanoseconds": nanoseconds_beside(table, time)}
     unit = "" if time is None else meanings[time].time_unit
     if unit in ("", TICKS):
         unit = table.metadata.get("time unit", unit)
@@ -285,16 +277,6 @@ def _clock_columns(table: Table, meanings: Meanings, said: Meanings, mapping: st
         found["counter"] = stated.counter
     is_ignored = re.search(r"(?:^|,)\s*(?:t|time)\s*=\s*(?:none|-)\s*(?:,|$)", mapping)
     return found | {"time": None if is_ignored else time, "time_unit": unit}
-
-
-def _nanoseconds_beside(table: Table, time: int | None) -> int | None:
-    """The nanoseconds of a time column of seconds, as ROS names them (``nsecs``, ``secs``), or behind it unnamed."""
-    if table.names is None and time is not None and time + 1 < len(table.columns):
-        return time + 1 if are_nanoseconds(table.columns[time], table.columns[time + 1]) else None
-    plain = [re.sub(r"\s*[\[(].*", "", name.strip().lower()) for name in table.names or ()]
-    stem = re.fullmatch(r"(.*?)secs?", plain[time]) if time is not None and plain else None
-    wanted = {f"{stem[1]}{word}" for word in ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")} if stem else set()
-    return next((i for i, name in enumerate(plain) if name in wanted), None)
 
 
 # What is stated of the choice: findings.

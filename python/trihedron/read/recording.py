@@ -90,7 +90,9 @@ def _of_log(log: Any, sensor: Sensor | None, options: Options) -> Sensors:
         with errors_of_system(Path(log)):
             tables = read_tables(Path(log), options)
     else:
-        tables = by_sensor(table_of(log))
+        tables = (table_of(log),)
+    if len(tables) == 1:
+        tables = by_sensor(tables[0])
     if len(tables) == 1 and options.columns is None and not tables[0].is_chosen:
         tables = (one_beside(tables[0], options.instance),)
     if len(tables) == 1:

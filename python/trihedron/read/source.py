@@ -8,7 +8,6 @@ from pathlib import Path
 
 from trihedron.read.archive import read_npy
 from trihedron.read.binary import read_binary, ros
-from trihedron.read.devices import by_sensor
 from trihedron.read.errors import ReadError, check_readable, errors_of_system, first_bytes
 from trihedron.read.kitti import oxts_folder, read_kitti
 from trihedron.read.memory import check_unpacked
@@ -97,5 +96,4 @@ def read_tables(path: Path, options: Options) -> tuple[Table, ...]:
     with ThreadPoolExecutor(1) as beside:
         digest = beside.submit(lambda: hashlib.sha256(data).hexdigest())
         found = read_text(path, unpacked(path, data), "", options.progress)
-    tables = tuple(replace(one, sha256=digest.result()) for one in found)
-    return by_sensor(tables[0]) if len(tables) == 1 else tables
+    return tuple(replace(one, sha256=digest.result()) for one in found)

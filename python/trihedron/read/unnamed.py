@@ -1,6 +1,8 @@
 """Columns without names of which the number does not say what they are: clocks and constants by their values, the
 accelerometer because its length while static is gravity, the gyro because it turns as gravity does."""
 
+import re
+
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
@@ -26,6 +28,7 @@ _SECONDS = (1e9, 4e9)
 """Whole seconds since 1970."""
 
 Roles = dict[int, ColumnName]
+Triad = tuple[int, int, int]
 
 
 def by_values(table: Table, columns: list[int], time: int | None) -> tuple[Roles, tuple[Finding, ...]]:
@@ -67,9 +70,19 @@ def by_values(table: Table, columns: list[int], time: int | None) -> tuple[Roles
     return roles, (note,)
 
 
-def is_force(table: Table, triad: tuple[int, ...], accelerometer: tuple[int, ...] | None, time: int | None) -> bool:
-    """Whether columns have the length of gravity in several poses, and neither turn the ``accelerometer``'s readings
-    as a gyro's would, nor are turned by them, as where the names of both sensors are exchanged."""
+def forces_of(table: Table, meanings: Roles, accelerometers: list[Triad], gyroscopes: list[Triad]) -> list[Triad]:
+    """Triads that are a gyro by the letter g alone, which also means a force in g, and are gravity by their values.
+
+    They have its length in several poses, and neither turn the accelerometer's readings as a gyro's would, nor are
+    turned by them, as where the names of both sensors are exchanged.
+    """
+    time = next((i for i, one in meanings.items() if one.role == "time"), None)
+    named = [(triad, meanings[triad[0]]) for triad in gyroscopes]
+    by_letter = [t for t, one in named if not one.unit and one.group.partition("|")[0].split()[-1:] == ["g"]]
+    return [triad for triad in by_letter if _is_force(table, triad, next(iter(accelerometers), None), time)]
+
+
+def _is_force(table: Table, triad: Triad, accelerometer: Triad | None, time: int | None) -> bool:
     triads = [triad] if accelerometer is None else [triad, accelerometer]
     columns = [[table.columns[i][:_ROWS] for i in one] for one in triads]
     if not all(len(axis) >= _FEWEST_ROWS for axes in columns for axis in axes):
@@ -90,7 +103,17 @@ def _is_clock(values: FloatArray) -> bool:
     return bool(values[-1] > values[0] and np.mean(np.diff(values) >= 0.0) >= _NEARLY_ALL)
 
 
-def are_nanoseconds(seconds: FloatArray, values: FloatArray) -> bool:
+def nanoseconds_beside(table: Table, time: int | None) -> int | None:
+    """The nanoseconds of a time column of seconds, as ROS names them (``nsecs``, ``secs``), or behind it unnamed."""
+    if table.names is None and time is not None and time + 1 < len(table.columns):
+        return time + 1 if _are_nanoseconds(table.columns[time], table.columns[time + 1]) else None
+    plain = [re.sub(r"\s*[\[(].*", "", name.strip().lower()) for name in table.names or ()]
+    stem = re.fullmatch(r"(.*?)secs?", plain[time]) if time is not None and plain else None
+    wanted = {f"{stem[1]}{word}" for word in ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")} if stem else set()
+    return next((i for i, name in enumerate(plain) if name in wanted), None)
+
+
+def _are_nanoseconds(seconds: FloatArray, values: FloatArray) -> bool:
     """Whether values (n,) are the nanoseconds behind whole ``seconds`` (n,) since 1970."""
     if not (len(values) == len(seconds) > 0 and _SECONDS[0] < seconds[0] < _SECONDS[1]):
         return False

@@ -9,8 +9,6 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.probability import LN_FAULT
 from trihedron.quantiles import quantile
 
-CHUNK = 1 << 20
-"""Rows after which windows restart."""
 WINDOW = 64
 """Rows of a window."""
 
@@ -24,11 +22,9 @@ class Repeats:
         self.count = np.array(count, dtype=np.int64)
         self.longest = np.array(longest, dtype=np.int64)
         self.longest_start = np.array(start, dtype=np.int64)
-        # Windows restart every 2²⁰ rows; an incomplete window is used only where it is the only one.
-        left = (self.n - 1) % CHUNK
-        of_left = windows[-1:] / max(left, 1) if 0 < left < WINDOW else np.zeros((0, 4))
-        whole = windows[: (self.n - 1) // WINDOW] / float(WINDOW)
-        self.rates = np.concatenate([whole, of_left]) if self.n > 1 else np.zeros((1, 4))
+        # The last window where it is incomplete counts only where it is the only one.
+        width = max(min(WINDOW, self.n - 1), 1)
+        self.rates = windows[: max((self.n - 1) // width, 1)] / float(width) if self.n > 1 else np.zeros((1, 4))
         self.starts = WINDOW * np.arange(len(self.rates))
 
     def chance_outside(self, k: int, start: int, length: int) -> float:
