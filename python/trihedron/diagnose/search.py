@@ -195,14 +195,15 @@ class _Search:
     def _beside_relations(
         self, model: Hypothesis, without: tuple[Hypothesis, ...]
     ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
-        """Relations without a mechanism; an effect goes where it is not needed beside them, or where relations in its
-        place score more: beside an effect that resembles it nothing is left of a relation."""
+        """Relations without a mechanism. An effect goes where it is not needed beside them, or where one more in its
+        place scores more; where none stands beside it, as it resembles one, clearly more."""
         best = related(model, self.limit)
+        needed = best.score + (0.0 if best.relations else STRONG_SCORE)
         for k, (term, fewer) in enumerate(zip(model.terms, without, strict=True)):
             kept = [*best.model.terms[:k], *best.model.terms[k + 1 :]]
             beside = again(best.model, kept) if best.relations else fewer
             score = 2.0 * (best.model.log_evidence - beside.log_evidence) - term.cost
             near = max(self.limit, score - STRONG_SCORE)
-            if score < self.limit or related(fewer, near, best.relations).score > best.score:
+            if score < self.limit or related(fewer, near, best.relations).score > needed:
                 return self._beside_relations(*self._pruned(fewer))
         return model, without, best

@@ -36,11 +36,11 @@ class Related:
     score: float
 
 
-def related(model: Hypothesis, limit: float, begin: Sequence[Follows] = ()) -> Related:
+def related(model: Hypothesis, limit: float, begin: Sequence[Follows] | None = None) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``; beside those of another
     hypothesis, ``begin``, one more."""
-    found, terms = [one for one in begin if one.effect.family != TELEGRAPH], model.terms
-    known, most = {one.effect.id for one in found}, MOST_RELATIONS + bool(found)
+    found, terms = [one for one in begin or () if one.effect.family != TELEGRAPH], model.terms
+    known, most = {one.effect.id for one in found}, MOST_RELATIONS if begin is None else len(found) + 1
     if found:
         model = again(model, [*terms, *(one.term for one in found)])
     while len(found) < most and model.context.moves:
