@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from trihedron.diagnose.accepted import place
 from trihedron.diagnose.effects import by_id, catalogue
 from trihedron.probability import ndtr
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, ParameterDifference
@@ -88,7 +89,7 @@ class ComparedEffects:
     @property
     def in_order(self) -> tuple[AcceptedEffect, ...]:
         """Missing before surplus; last those that are no mechanism of an instrument (a scatter, a disturbed pose)."""
-        return tuple(sorted((*self.missing, *self.surplus), key=_place))
+        return tuple(sorted((*self.missing, *self.surplus), key=place))
 
 
 def compare_effects(
@@ -146,12 +147,6 @@ def is_footnote(effect: AcceptedEffect, has_motion: bool) -> bool:
     of = by_id()[effect.id]
     share = effect.share or 0.0
     return of.is_local or (of.is_of_motion and not (has_motion and share)) or (of.is_of_samples and share < FAINT)
-
-
-def _place(effect: AcceptedEffect) -> tuple[bool, bool]:
-    """Mechanisms come first, then lines, then a scatter or what concerns one pose."""
-    of = by_id()[effect.id]
-    return of.is_minor, of.is_of_samples
 
 
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:

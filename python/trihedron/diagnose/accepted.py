@@ -120,9 +120,14 @@ def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tu
     ``residuals`` of the poses, in the fit with all effects, are stored with each effect's curve.
     """
     made = [*_of_terms(answer, residuals), *_of_biases(answer, residuals), *_of_samples(answer)]
-    each = zip(answer.gains, answer.shares, made, strict=True)
-    order = sorted(each, key=lambda one: (one[0][0].is_minor, one[0][0].is_of_samples, -one[1]))
-    return tuple(replace(record, share=share) for _, share, record in order)
+    each = [replace(record, share=share) for record, share in zip(made, answer.shares, strict=True)]
+    return tuple(sorted(each, key=lambda one: (*place(one), -(one.share or 0.0))))
+
+
+def place(one: AcceptedEffect) -> tuple[bool, bool]:
+    """Mechanisms come first, then lines, then a scatter, what may as well be one, and what concerns one pose."""
+    of, may_be_spread = by_id()[one.id], any(by_id()[rival].is_spread for rival in one.confounded_with)
+    return of.is_minor or may_be_spread, of.is_of_samples
 
 
 def _of_terms(answer: Answer, residuals: Sequence[DomainResiduals]) -> list[AcceptedEffect]:
