@@ -24,6 +24,7 @@ from trihedron.estimate.noise.screening import (
     repeated_rows,
     shaken,
     steps_and_impacts,
+    tail_error,
     turn_of_gravity,
 )
 from trihedron.estimate.noise.slow_changes import (
@@ -36,7 +37,7 @@ from trihedron.estimate.noise.slow_changes import (
     steps_of,
     without,
 )
-from trihedron.estimate.noise.spectrum import error_of_mean, evenness, ordinates
+from trihedron.estimate.noise.spectrum import evenness, ordinates, spread_of_mean
 from trihedron.estimate.noise.two_levels import two_levels
 from trihedron.ranges import merged
 from trihedron.records import AllanCurve, Finding
@@ -239,7 +240,8 @@ class Channel:
         self, blank: NoiseAxis, curve: AllanCurve, channel: int, heat: FloatArray | None = None
     ) -> NoiseAxis:
         """The ``blank`` axis with its terms, beside the temperature (n,), and the findings of the channel."""
-        even, ratio = evenness(self.column if self.head is None else self.head)
+        fast = self.column if self.head is None else self.head
+        even, ratio = evenness(fast)
         said = (*remarks.jumps(self.stepped(), self.rate_hz, self.unit), *self.findings)
         said = (*said, *remarks.uneven(even, ratio, self.louder))
         blank = replace(blank, findings=(*said, *blank.findings))
@@ -252,8 +254,8 @@ class Channel:
             smooth = [one for one in changes if one.kind != STEP]
             bands = ordinates(x, self.rate_hz, self.stretches(k), smooth, head)
             choices.append([replace(band, count=even * band.count) for band in bands])
-        # N of readings with long tails, or of a level that changes, is the mean of a sample of pieces.
-        tails = 0.5 * error_of_mean(even)
+        # N of a level that changes is the mean of a sample of pieces.
+        tails = math.hypot(tail_error(fast), 0.5 * spread_of_mean(even))
         axis = identify_axis(choices, blank, curve, channel, tails, range_degc)
         # Drift that the temperature explains is stated with it.
         others = tuple(one for one in axis.findings if one.code != "log-drift")

@@ -153,12 +153,13 @@ def _has_floor(whole: BinnedSpectrum, highest_hz: float, step_s: float, rounding
 def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
     """Whether the top of the band falls below the terms fitted two octaves below it, as no noise term does."""
     low = spectrum.frequency_hz <= highest_hz / 4.0
-    if np.count_nonzero(low) < 8:
+    near = low & (spectrum.frequency_hz > highest_hz / 32.0)
+    if np.count_nonzero(low) < 8 or not near.any():
         return False
     below = spectrum.below(highest_hz / 4.0)
     ratio = spectrum.ratio(below.likelihood.fit((1, 2, 3)))
     # The level below is a median of bins, robust to a resonance there.
-    level = float(np.median(ratio[low & (spectrum.frequency_hz > highest_hz / 32.0)]))
+    level = float(np.median(ratio[near]))
     top = spectrum.frequency_hz > highest_hz / 2.0 ** (1 / 3)
     count = spectrum.count[top].sum()
     if not count or not level > 0.0:

@@ -237,6 +237,22 @@ def readout(x: FloatArray) -> Readout:
     return Readout(resolution, sigma, float(np.mean(change == 0.0)), clipped)
 
 
+def tail_error(x: FloatArray) -> float:
+    """Relative standard error of the white noise density of readings ``x`` (n,) due to their excess kurtosis.
+
+    The variance of n independent readings with excess kurtosis κ has the relative variance (2 + κ)/n, of which the
+    spectral likelihood includes 2/n; κ is twice that of differences of neighbours, which slow noise does not affect.
+    """
+    change = np.diff(x)
+    change = change[np.isfinite(change)]
+    square = np.square(change)
+    mean = float(square.mean()) if len(change) else 0.0
+    if mean == 0.0:
+        return 0.0
+    excess = 2.0 * (float(square @ square) / len(change) / mean**2 - 3.0)
+    return 0.5 * math.sqrt(max(excess, 0.0) / len(change))
+
+
 def repeated_rows(x: FloatArray) -> float:
     """Share of rows ``x`` (n, channels) that repeat the row before in all channels together, beyond chance."""
     sample = x[:200_000]

@@ -155,8 +155,8 @@ def ordinates(
     return bands
 
 
-def error_of_mean(even: float) -> float:
-    """Relative standard error of a mean power over the pieces of a log, beyond that of Gaussian noise of one level."""
+def spread_of_mean(even: float) -> float:
+    """Relative standard error of a mean power over the pieces of a log of this evenness."""
     return math.sqrt((1.0 / even - 1.0) / PIECES)
 
 
@@ -164,9 +164,9 @@ PIECES = 64
 
 
 def evenness(x: FloatArray) -> tuple[float, float]:
-    """Share of the degrees of freedom of ``x`` (n,) that long tails, and a level of noise which changes along the log,
-    leave: (mean s)² over mean s², s the powers of the differences of readings in pieces, without the scatter that
-    Gaussian readings have; and the level of the loudest piece over that of the quietest."""
+    """Share of the degrees of freedom of ``x`` (n,) that a level of noise which changes along the log leaves: (mean s)²
+    over mean s², s the powers of the differences of readings in pieces, without their own scatter; and the level of the
+    loudest piece over that of the quietest."""
     length = len(x) // PIECES
     step = np.diff(x[: length * PIECES].reshape(PIECES, length), axis=1) ** 2
     count = np.isfinite(step).sum(axis=1)
