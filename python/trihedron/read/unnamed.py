@@ -91,8 +91,8 @@ def _is_force(table: Table, triad: Triad, accelerometer: Triad | None, time: int
     rate = _ROWS_A_SECOND if time is None else _rows_a_second(table.columns[time][:_ROWS])
     if not _is_gravity(readings[0], rate):
         return False
-    pairs = (readings, readings[::-1]) if accelerometer else ()
-    return all(_correlation(*pair, rate) < CLEAR_CORRELATION for pair in pairs)
+    pairs = [] if accelerometer is None else [(readings[0], readings[1]), (readings[1], readings[0])]
+    return all(_correlation(gravity, rates, rate) < CLEAR_CORRELATION for gravity, rates in pairs)
 
 
 def _axes(sensor: str, triad: tuple[int, ...] | list[int]) -> Roles:
