@@ -62,9 +62,12 @@ impl Fit {
         }
         let bends = session.nonlinear_axes(self)?;
         let hypothesis = Hypothesis::of(self, &bends, &[COLLECTED; N_COEFFICIENTS])?;
-        let force = force_tried(self, session, &hypothesis);
         // Nonlinear axes of the accelerometer say nothing of the gyro's bias.
-        let rate = rate_tried(&self.strengths, &Hypothesis::of(self, &[], &[])?);
+        let without = Hypothesis::of(self, &[], &[])?;
+        let (force, rate) = rayon::join(
+            || force_tried(self, session, &hypothesis),
+            || rate_tried(&self.strengths, &without),
+        );
         let both = force.iter().flat_map(|(value, of_force)| {
             rate.iter().map(move |(beside, of_rate)| {
                 let mut at = *of_force;

@@ -11,6 +11,10 @@ use super::strength_search::NO_SCATTER;
 /// largest.
 const STEP: f64 = 0.3;
 const BETWEENS: [f64; 2] = [0.05, 1.2];
+/// Logarithm up to which a departure is the fitted one.
+const SAME: f64 = 0.1;
+/// Log-evidence below the largest at which a scatter, and those further from the likely ones, have no weight.
+const NO_WEIGHT: f64 = 14.0;
 
 /// Log-evidence of possible walks of the gyro's bias, each at its likeliest departure between poses and beside the mean
 /// square of every axis' possible scatters: variances are linear in that.
@@ -24,16 +28,26 @@ pub(super) fn rate_tried(fitted: &Strengths, hypothesis: &Hypothesis) -> Vec<(f6
         corners.extend(AROUND.map(|part| part * fitted.corner_s[1]));
     }
     let scatters = scatters_beforehand(&fitted.scatter[1..]);
-    let mut out = vec![(f64::NEG_INFINITY, *fitted); corners.len()];
-    for between in [fitted.between[1], BETWEENS[0], BETWEENS[1]] {
+    let others = BETWEENS.map(|between| (between, (between / fitted.between[1]).ln().abs()));
+    let others = others.iter().filter(|(_, apart)| *apart > SAME);
+    let mut at_betweens = vec![*fitted];
+    at_betweens.extend(others.map(|(between, _)| {
         let mut at = *fitted;
-        at.between[1] = between;
-        let found = [1, 2, 3].map(|axis| hypothesis.by_scatter(&at, axis, &scatters, &corners));
-        let beside = hypothesis.by_corner(&at, 1, &corners);
+        at.between[1] = *between;
+        at
+    }));
+    let asked = |at: &Strengths| {
+        let axes = [1, 2, 3].into_par_iter();
+        let found = axes.map(|axis| hypothesis.by_scatter(at, axis, &scatters, &corners));
+        let found: Vec<Vec<Vec<f64>>> = found.collect();
+        (*at, found, hypothesis.by_corner(at, 1, &corners))
+    };
+    let each: Vec<_> = at_betweens.par_iter().map(asked).collect();
+    let mut out = vec![(f64::NEG_INFINITY, *fitted); corners.len()];
+    for (mut at, found, beside) in each {
         for (c, (known, fitted)) in out.iter_mut().zip(beside).enumerate() {
-            let gains = found
-                .each_ref()
-                .map(|axis| axis.iter().map(|one| one[c] - fitted).collect());
+            let gains =
+                std::array::from_fn(|axis| found[axis].iter().map(|one| one[c] - fitted).collect());
             let (gain, squares) = averaged(&scatters, &gains);
             if fitted + gain > known.0 {
                 at.corner_s[1] = corners[c];
@@ -85,7 +99,7 @@ fn averaged(scatters: &[(f64, f64)], gains: &[Vec<f64>; 3]) -> (f64, [f64; 3]) {
 
 impl Hypothesis {
     /// Log-evidence of each of some scatters, by its index, and each corner time of that sensor's walk; the other
-    /// strengths are those `at` some point.
+    /// strengths are those `at` some point. From the scatter there on, either way to the first without weight.
     pub(super) fn by_scatter(
         &self,
         at: &Strengths,
@@ -93,12 +107,30 @@ impl Hypothesis {
         scatters: &[(f64, f64)],
         corners: &[f64],
     ) -> Vec<Vec<f64>> {
-        let one = |&(scatter, _): &(f64, f64)| {
-            let mut at = *at;
-            at.scatter[index] = scatter;
-            self.by_corner(&at, index.min(1), corners)
-        };
-        scatters.par_iter().map(one).collect()
+        let apart = |&(scatter, _): &(f64, f64)| (scatter / at.scatter[index]).ln().abs();
+        let nearest = scatters.iter().map(apart).enumerate();
+        let first = nearest
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(0, |(k, _)| k);
+        let mut out = vec![vec![f64::NEG_INFINITY; corners.len()]; scatters.len()];
+        let mut best = out[first].clone();
+        let (up, down): (Vec<usize>, Vec<usize>) = (0..scatters.len()).partition(|k| *k >= first);
+        for way in [up, down.into_iter().rev().collect()] {
+            for k in way {
+                let mut at = *at;
+                at.scatter[index] = scatters[k].0;
+                out[k] = self.by_corner(&at, index.min(1), corners);
+                let mut is_likely = false;
+                for (best, value) in best.iter_mut().zip(&out[k]) {
+                    *best = best.max(*value);
+                    is_likely |= *value > *best - NO_WEIGHT;
+                }
+                if !is_likely {
+                    break;
+                }
+            }
+        }
+        out
     }
 
     /// Log-evidence of each corner time of a sensor's walk.
