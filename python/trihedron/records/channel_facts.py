@@ -33,6 +33,23 @@ class Limit(Frozen):
         """Readings at the limit."""
         return int(np.sum(self.runs[:, 1] - self.runs[:, 0]))
 
+    def bridged(
+        self, time_s: FloatArray, readings: FloatArray, first: int, stop: int
+    ) -> tuple[FloatArray, float] | None:
+        """A run of the readings (n, 3) on the cubic that continues the slopes on both sides, and its area beyond the
+        chord: ``T² (s₁ − s₂)/12`` with slopes ``s₁, s₂`` at the ends of a run of length ``T``; ``None`` at an end of
+        the log."""
+        t, column, left = time_s, readings[:, self.axis], first - 1
+        if left < 1 or stop > len(column) - 2 or min(t[left] - t[left - 1], t[stop + 1] - t[stop]) <= 0.0:
+            return None
+        span = float(t[stop] - t[left])
+        enter, leave = (float((column[k] - column[k - 1]) / (t[k] - t[k - 1])) for k in (left, stop + 1))
+        # The Hermite cubic: SciPy has it, and takes longer to load than a calibration does.
+        u = (t[first:stop] - t[left]) / span
+        rises, falls = (u**3 - 2 * u**2 + u) * enter, (u**3 - u**2) * leave
+        chord = column[left] + (3 * u**2 - 2 * u**3) * (column[stop] - column[left])
+        return chord + span * (rises + falls), span**2 * abs(enter - leave) / 12.0
+
 
 @dataclass(frozen=True)
 class LowPass:

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
@@ -172,16 +171,12 @@ def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
     """
     if not facts.limits:
         return readings
-    out = readings.copy()
+    out, index = readings.copy(), np.arange(len(readings), dtype=np.float64)
     for limit in facts.limits:
-        column = readings[:, limit.axis]
-        away, sign = abs(limit.value - float(np.nanmedian(column))), 1.0 if limit.is_high else -1.0
+        away, sign = abs(limit.value - float(np.nanmedian(readings[:, limit.axis]))), 1.0 if limit.is_high else -1.0
         for first, stop in limit.runs.tolist():
-            if first < 2 or stop > len(column) - 2:
-                continue
-            before, after = column[first - 2 : first], column[stop : stop + 2]
-            slopes = np.concatenate([np.diff(before), np.diff(after)])
-            curve = CubicHermiteSpline([first - 1, stop], [before[1], after[0]], slopes)
-            beyond = sign * (curve(np.arange(first, stop)) - limit.value)
-            out[first:stop, limit.axis] = limit.value + sign * np.clip(beyond, 0.0, away)
+            found = limit.bridged(index, readings, first, stop)
+            if found is not None:
+                beyond = np.clip(sign * (found[0] - limit.value), 0.0, away)
+                out[first:stop, limit.axis] = limit.value + sign * beyond
     return out

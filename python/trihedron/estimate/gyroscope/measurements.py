@@ -238,10 +238,9 @@ def bridge_clipping(recording: Recording, rows: IntArray) -> tuple[FloatArray, F
     """Gyro readings at ``rows`` (k,) with clipped runs replaced by the cubic that continues the slopes on both sides:
     readings (k, 3), their variances (k, 3) by the replacement, raw², and which are replaced (k, 3).
 
-    A cubic with slopes ``s₁, s₂`` at the ends of a run of length ``T`` has the area ``T² (s₁ − s₂)/12`` above the
-    chord; its standard uncertainty is ``DOUBT`` of it.
+    The standard uncertainty of its area is ``DOUBT`` of what is above the chord.
     """
-    gyroscope = recording.gyroscope
+    gyroscope, time_s = recording.gyroscope, recording.time_s
     assert gyroscope is not None
     rate = gyroscope[rows]
     variance, is_clipped = np.zeros(rate.shape), np.zeros(rate.shape, dtype=bool)
@@ -249,31 +248,10 @@ def bridge_clipping(recording: Recording, rows: IntArray) -> tuple[FloatArray, F
         for first, stop in limit.runs.tolist():
             at = np.flatnonzero((rows >= first) & (rows < stop))
             is_clipped[at, limit.axis] = True
-            found = _bridge(recording.time_s, gyroscope[:, limit.axis], first, stop - 1) if len(at) else None
+            found = limit.bridged(time_s, gyroscope, first, stop) if len(at) else None
             if found is not None:
-                rate[at, limit.axis], variance[at, limit.axis] = found[0][rows[at] - first], found[1]
+                # Equal and independent variances of the run's samples, whose integral has the variance of the area.
+                count, step_s = stop - first, (time_s[stop] - time_s[first - 1]) / (stop - first + 1)
+                rate[at, limit.axis] = found[0][rows[at] - first]
+                variance[at, limit.axis] = (DOUBT * found[1] / step_s) ** 2 / count
     return rate, variance, is_clipped
-
-
-def _bridge(time_s: FloatArray, column: FloatArray, first: int, last: int) -> tuple[FloatArray, float] | None:
-    """Readings from ``first`` to ``last`` on the cubic, and the variance of each; ``None`` at an end of the log."""
-    left, right = first - 1, last + 1
-    if left < 1 or right > len(column) - 2:
-        return None
-    span = time_s[right] - time_s[left]
-    before, after = time_s[left] - time_s[left - 1], time_s[right + 1] - time_s[right]
-    if span <= 0.0 or before <= 0.0 or after <= 0.0:
-        return None
-    enter = (column[left] - column[left - 1]) / before
-    leave = (column[right + 1] - column[right]) / after
-    # The Hermite cubic: SciPy has it, and takes longer to load than a calibration does.
-    u = (time_s[first : last + 1] - time_s[left]) / span
-    readings = (
-        (2 * u**3 - 3 * u**2 + 1) * column[left]
-        + (u**3 - 2 * u**2 + u) * span * enter
-        + (3 * u**2 - 2 * u**3) * column[right]
-        + (u**3 - u**2) * span * leave
-    )
-    area, count = span**2 * abs(enter - leave) / 12.0, last - first + 1
-    # Equal and independent variances of the run's samples, whose integral has the variance of the area.
-    return readings, float((DOUBT * area) ** 2 / count / (span / (count + 1)) ** 2)
