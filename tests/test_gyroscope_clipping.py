@@ -11,8 +11,8 @@ from diagnosed_session import unit_of
 from hand_made_sessions import G, Instrument, recorded
 from trihedron import _core, calibrate
 from trihedron.estimate.accelerometer.faces import calibrate_faces
-from trihedron.estimate.gyroscope.measurements import bridge_clipping
-from trihedron.estimate.gyroscope.stated_turns import TableTurns, measure_turns
+from trihedron.estimate.gyroscope.measurements import bridge_clipping, rate_noise_density
+from trihedron.estimate.gyroscope.stated_turns import measured_turns
 from trihedron.records import Calibration, Move, Recording, SensorCalibration
 from trihedron.segment.means import BIAS_VARIANCE, NOISE_TRIED
 from trihedron.session.rounding import STEADY
@@ -114,23 +114,22 @@ def turned(recording, spans, static, angles, axes, scale):
     """S, b and their standard errors by turns in samples ``spans`` by ``angles`` [rad] about the body's ``axes``: on a
     prior of the bias at rest, of scales to 30 %, and of the share of other axes, which no turn shows, to 1 %."""
     moves = [Move(k, k, k + 1, a, b) for k, (a, b) in enumerate(spans)]
-    measured = measure_turns(recording, moves, static)
-    turns = TableTurns(
-        **vars(measured), moves=moves, numbers=1 + np.arange(len(moves)), begin_s=np.zeros(len(moves)),
-        angles=np.array(angles), up=np.eye(3)[axes], is_stated=True,
-    )  # fmt: skip
+    known = list(zip(range(1, 1 + len(moves)), moves, angles, strict=True))
+    turns = measured_turns(recording, known, np.eye(3)[axes], static, is_stated=True)
     rest_s = sum(recording.time_s[b - 1] - recording.time_s[a] for a, b in static)
-    of_bias = measured.var_rate / rest_s + measured.bias_spread / len(static) + np.sum(measured.hidden**2, axis=(0, 2))
+    var_rate, lasts_s = rate_noise_density(recording, [[span] for span in static]) ** 2, turns.duration_s[0]
+    spread = turns.variance[0] / lasts_s**2 - var_rate / lasts_s
+    of_bias = var_rate / rest_s + spread / len(static) + np.sum(turns.hidden**2, axis=(0, 2))
     covariance = np.zeros((24, 24))
     covariance[12:21, 12:21] = scale**2 * np.diag(np.where(np.eye(3), 0.3, 1e-2).ravel() ** 2)
     # b = -S z: known as z is, whatever the scale.
-    by_scale = -np.kron(np.eye(3), measured.bias)
+    by_scale = -np.kron(np.eye(3), turns.bias)
     covariance[21:, 12:21] = by_scale @ covariance[12:21, 12:21]
     covariance[12:21, 21:] = covariance[21:, 12:21].T
     covariance[21:, 21:] = by_scale @ covariance[12:21, 21:] + scale**2 * np.diag(of_bias)
     sensors = [
         SensorCalibration(s * np.eye(3), b, covariance[at : at + 12, at : at + 12], "counts", unit, "prior")
-        for s, b, at, unit in ((1.0, np.zeros(3), 0, "m/s^2"), (scale, -scale * measured.bias, 12, "rad/s"))
+        for s, b, at, unit in ((1.0, np.zeros(3), 0, "m/s^2"), (scale, -scale * turns.bias, 12, "rad/s"))
     ]
     known = Calibration(*sensors, covariance, "case", 9.81, "assumed")
     found = turns.rates().scattered_on(known)

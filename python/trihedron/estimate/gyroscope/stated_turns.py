@@ -36,32 +36,14 @@ less."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MeasuredTurns:
-    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the ``bias`` (3,) at rest, and their noise.
-
-    ``var_rate`` (3,) is ``N²`` in raw unit² · s, ``bias_spread`` (3,) the variance of the true bias between intervals
-    without rotation. ``hidden`` (k, 3, m) are errors by rounding.
-    """
-
-    raw_angle: FloatArray
-    duration_s: FloatArray
-    bias: FloatArray
-    var_rate: FloatArray
-    bias_spread: FloatArray
-    hidden: FloatArray
-
-    @property
-    def variance(self) -> FloatArray:
-        """(k, 3) variance of the raw angles but for rounding."""
-        times = self.duration_s[:, None]
-        return self.var_rate * times + self.bias_spread * times**2
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TableTurns(MeasuredTurns):
+class TableTurns:
     """``moves`` that leave gravity where it is, with their ``numbers`` (k,) among all, from one, which begin at
     ``begin_s`` (k,): turns by ``angles`` (k,) [rad] about the vertical ``up`` (k, 3), counter-clockwise seen from
-    above, which are stated or taken as such."""
+    above, which are stated or taken as such.
+
+    ``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of each, with the ``variance`` (k, 3) of its raw angles, and
+    ``hidden`` (k, 3, m), errors by rounding; ``bias`` (3,) at rest.
+    """
 
     moves: list[Move]
     numbers: IntArray
@@ -69,13 +51,18 @@ class TableTurns(MeasuredTurns):
     angles: FloatArray
     up: FloatArray
     is_stated: bool
+    raw_angle: FloatArray
+    duration_s: FloatArray
+    variance: FloatArray
+    hidden: FloatArray
+    bias: FloatArray
 
     def of(self, used: BoolArray) -> TableTurns:
         """The turns ``used`` (k,)."""
         return replace(
             self, moves=[self.moves[k] for k in np.flatnonzero(used)], numbers=self.numbers[used],
             begin_s=self.begin_s[used], angles=self.angles[used], up=self.up[used], raw_angle=self.raw_angle[used],
-            duration_s=self.duration_s[used], hidden=self.hidden[used],
+            duration_s=self.duration_s[used], variance=self.variance[used], hidden=self.hidden[used],
         )  # fmt: skip
 
     def along(self, gyro: SensorCalibration) -> tuple[FloatArray, FloatArray]:
@@ -107,7 +94,8 @@ def table_turns(
 ) -> TableTurns:
     """The turns of a recording by stated angles [°], 0 of which excludes one; ``None``: all, by angles still unknown.
 
-    Raises ``InputError`` when the numbers of turns and angles differ.
+    The noise is measured at rest. Raises ``InputError`` when the numbers of turns and angles differ, or the poses are
+    too short for it.
     """
     assert segments.accelerometer_mean is not None
     up = directions_of(correct(segments.accelerometer_mean, accelerometer.S, accelerometer.b))
@@ -117,17 +105,47 @@ def table_turns(
         known = [(k, move, 0.0) for k, move in enumerate(level, start=1)]
     else:
         known = stated(recording, level, angles_deg)
-    moves = [move for _, move, _ in known]
     # Static poses are turns by 0°, which determine the bias.
     still = [(pose.start, pose.stop) for pose in segments.poses if pose.stop - pose.start >= 2]
+    before = np.array([move.pose_before for _, move, _ in known], dtype=np.int64)
+    return measured_turns(recording, known, up[before], still, is_stated=angles_deg is not None)
+
+
+def measured_turns(
+    recording: Recording,
+    known: Sequence[tuple[int, Move, float]],
+    up: FloatArray,
+    still: Sequence[tuple[int, int]],
+    *,
+    is_stated: bool,
+) -> TableTurns:
+    """The ``known`` turns (number, move, angle) about verticals ``up`` (k, 3), integrated; the noise is measured where
+    the sensor is ``still``.
+
+    Raises ``InputError`` when that is too short.
+    """
+    gyroscope, quantum = recording.gyroscope, recording.facts.of("gyroscope").step
+    assert gyroscope is not None
+    numbers, moves, angles = zip(*known, strict=True) if known else ((), (), ())
+    edges = np.array([[turn.start, turn.stop] for turn in moves], dtype=np.int64).reshape(-1, 2)
+    static = np.array(still, dtype=np.int64)
+    raw_angle, duration_s = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
+    static_angle, static_s = integrate_raw_rate(recording.time_s, gyroscope, static, 1)
+    var_rate, rest_s = rate_noise_density(recording, [[span] for span in still]) ** 2, np.array(static_s)[:, None]
+    bias, _, spread = pool_biases(static_angle / rest_s, var_rate / rest_s)
+    lasts_s = np.array(duration_s)[:, None]
     return TableTurns(
-        **vars(measure_turns(recording, moves, still)),
-        moves=moves,
-        numbers=np.array([k for k, *_ in known], dtype=np.int64),
-        begin_s=recording.time_s[[move.start for move in moves]],
-        angles=np.array([angle for *_, angle in known]),
-        up=up[np.array([move.pose_before for move in moves], dtype=np.int64)],
-        is_stated=angles_deg is not None,
+        moves=list(moves),
+        numbers=np.array(numbers, dtype=np.int64),
+        begin_s=recording.time_s[edges[:, 0]],
+        angles=np.array(angles, dtype=np.float64),
+        up=up,
+        is_stated=is_stated,
+        raw_angle=raw_angle,
+        duration_s=lasts_s[:, 0],
+        variance=var_rate * lasts_s + spread * lasts_s**2,
+        hidden=hidden_angles(gyroscope, 1.0 / recording.rate_hz, quantum, edges, static, raw_angle),
+        bias=bias,
     )
 
 
@@ -234,27 +252,6 @@ def left_out(rates: StatedRates, calibration: Calibration, scatter: float = 0.0)
     """Error (k,) of each rate as the others predict it, and its variance (k,)."""
     error, covariance = rates.on(calibration, scatter).left_out(np.arange(len(rates.unit))[:, None])
     return error[:, 0], covariance[:, 0, 0]
-
-
-def measure_turns(recording: Recording, turns: Sequence[Move], static: Sequence[tuple[int, int]]) -> MeasuredTurns:
-    """Integrate turns and static intervals; the noise is measured in the static intervals.
-
-    Raises ``InputError`` when the static intervals are too short to measure the noise.
-    """
-    assert recording.gyroscope is not None
-    gyroscope, step_s, quantum = recording.gyroscope, 1.0 / recording.rate_hz, recording.facts.of("gyroscope").step
-    edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64).reshape(-1, 2)
-    raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
-    static_edges = np.array(static, dtype=np.int64)
-    static_angle, static_duration = integrate_raw_rate(recording.time_s, gyroscope, static_edges, 1)
-    var_rate = rate_noise_density(recording, [[span] for span in static]) ** 2
-    static_s = np.array(static_duration)[:, None]
-    bias, _, spread = pool_biases(static_angle / static_s, var_rate / static_s)
-    hidden = hidden_angles(gyroscope, step_s, quantum, edges, static_edges, raw_angle)
-    return MeasuredTurns(
-        raw_angle=raw_angle, duration_s=np.array(duration), bias=bias, var_rate=var_rate, bias_spread=spread,
-        hidden=hidden,
-    )  # fmt: skip
 
 
 def other_sense(is_reversed: BoolArray, angles: FloatArray) -> InputError:
