@@ -25,7 +25,7 @@ pub mod lever_arm;
 pub mod lines;
 pub mod log_sum;
 pub mod mean_noise;
-pub mod move_moments;
+
 pub mod move_signals;
 pub mod noise_change;
 pub mod noise_floor;
@@ -39,6 +39,7 @@ pub mod reference_motion;
 pub mod rotation;
 pub mod rounding;
 pub mod running;
+pub mod scale_from_moves;
 pub mod screening;
 pub mod sensor_model;
 pub mod session_model;

@@ -114,7 +114,8 @@ def test_a_start_that_is_no_attitude_is_refused(start):
 def of_move(time_s, raw, degree, S=MOVED, b=NO_BIAS):
     """Rotation of one move, and what turns it by the scale (3, 9) and by the biases before and behind."""
     edges, anchors = np.array([[0, len(time_s)]]), np.array([[time_s[0] - 1.5, time_s[-1] + 2.5]])
-    return [part[0] for part in _core.integrate_moves(time_s, raw, edges, anchors, S, b[:1], b[1:], degree, QUIET)[:4]]
+    found = _core.integrate_moves(time_s, raw, edges, anchors, S[None], b[:1], b[1:], degree, QUIET)
+    return [part[0] for part in found[:4]]
 
 
 def wandering(t):
@@ -157,8 +158,8 @@ def test_a_move_is_its_two_parts_one_after_the_other(size):
 
     def of(start, stop):
         at = np.array([[start, stop]]), np.array([[-1.5, 3.1]])
-        found = _core.integrate_moves(t, size * wandering(t), *at, MOVED, b[:1], b[1:], 1, noise)
-        return [part[0] for part in found]
+        *found, _, covariance = _core.integrate_moves(t, size * wandering(t), *at, MOVED[None], b[:1], b[1:], 1, noise)
+        return [part[0] for part in (*found, covariance)]
 
     (whole, *parts), (first, *begun), (second, *ended) = of(0, 61), of(0, 25), of(24, 61)
     np.testing.assert_allclose(whole, second @ first, atol=1e-12)
@@ -190,7 +191,7 @@ def test_a_move_bridges_lost_rows_and_repeated_timestamps_and_is_refused_outside
     for time_s, stop, end in ((t, 102, 4.5), (back, 101, 4.5), (t, 101, -1.5)):
         edges, anchors = np.array([[0, stop]]), np.array([[-1.5, end]])
         with pytest.raises(ValueError, match=r"\w"):
-            _core.integrate_moves(time_s, raw, edges, anchors, MOVED, NO_BIAS[:1], NO_BIAS[1:], 1, QUIET)
+            _core.integrate_moves(time_s, raw, edges, anchors, MOVED[None], NO_BIAS[:1], NO_BIAS[1:], 1, QUIET)
 
 
 def triad(seed: int, *, left_handed: bool = False) -> tuple[np.ndarray, np.ndarray]:

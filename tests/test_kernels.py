@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import fft, special
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 from trihedron import _core, probability
 from trihedron.diagnose.slope import smoothed_slope
@@ -81,39 +82,38 @@ def test_neighbouring_blocks_differ_by_what_their_means_do():
         assert _core.block_differences(rows, np.array(ranges), np.array(owner), 2) == ([size, 0, 0], n)
 
 
-def test_moments_of_moves_are_trapezoids_over_the_rows_that_are_numbers():
-    rng = np.random.default_rng(7)
-    time = np.cumsum(rng.uniform(0.005, 0.02, 120))
-    reading, rate, zero = 3e4 + 1e3 * rng.normal(size=(120, 3)), rng.normal(size=(120, 3)), rng.normal(size=(4, 3))
-    reading[17], rate[[18, 55, 56, 58]] = np.nan, np.inf
-    S, b = rng.normal(size=(3, 3)), 1e4 * rng.normal(size=3)
-    moves = np.array([[0, 50], [54, 58], [60, 61], [60, 120]])
-    found = _core.move_moments(time, reading, S, b, rate, moves, zero)
-    for k in (0, 1, 3):
-        a, z = moves[k]
-        keep = a + np.flatnonzero(np.isfinite(reading[a:z]).all(axis=1) & np.isfinite(rate[a:z]).all(axis=1))
-        product = np.einsum("ni,nj->nij", reading[keep] @ S.T + b, rate[keep] - zero[k])
-        twin = np.trapezoid(product, time[keep], axis=0)
-        # Sixty products of one size.
-        np.testing.assert_allclose(found[k], twin, rtol=0.0, atol=1e-12 * np.abs(product).max())
-    assert found[2] is None
-
-
-def test_a_force_rotated_from_both_ends_of_a_move_obeys_poissons_equation_at_the_true_scale():
-    rng = np.random.default_rng(8)
-    time, turn = np.linspace(0.0, 1.0, 2001), rng.normal(size=3)
-    rate, scale, bias = np.outer(30.0 * time**2 * (1.0 - time) ** 2, turn), rng.normal(size=(3, 3)), rng.normal(size=3)
-    before, angle = 9.8 * rng.normal(size=3), scale @ turn
-    unit = angle / np.linalg.norm(angle)
-    across, c, s = np.cross(before, unit), np.cos(np.linalg.norm(angle)), np.sin(np.linalg.norm(angle))
-    after = unit * (unit @ before) * (1.0 - c) + before * c + across * s
-    (moment,) = _core.rotated_moments(
-        time, rate + bias, np.array([[0, len(time)]]), bias[None], scale, before[None], after[None]
+def turned(n, scale, rng):
+    """Arguments of ``scale_from_moves``: n moves about fixed axes, with rows that are no numbers."""
+    t = np.linspace(0.0, 1.0, 1001)
+    speed, share = 30.0 * t**2 * (1.0 - t) ** 2, t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    S, b, bias = np.eye(3) + 0.1 * rng.normal(size=(3, 3)), rng.normal(size=3), rng.normal(size=(n, 3))
+    turns, ups = rng.normal(size=(n, 3)), 9.8 * Rotation.random(n, random_state=1).apply([0.0, 0.0, 1.0])
+    force = np.array(
+        [Rotation.from_rotvec(-np.outer(share, one)).apply(up) for one, up in zip(turns, ups, strict=True)]
     )
-    # ∫ f × S w dt; the force turns by 4 mrad a step at most, and the rule of its middle errs by a 24th of the square.
-    cross = np.cross(np.eye(3)[:, None], np.eye(3)[None])
-    found = np.einsum("ij,ijk->k", moment @ scale.T, cross)
-    np.testing.assert_allclose(found, after - before, atol=1e-5 * np.linalg.norm(before))
+    rate = np.array([np.outer(speed, np.linalg.solve(scale, one)) for one in turns]) + bias[:, None]
+    reading = (force - b) @ np.linalg.inv(S).T
+    reading[0, 17], rate[-1, [300, 301, 303]] = np.nan, np.inf
+    time, edges = np.concatenate([t + 2.0 * k for k in range(n)]), 1001 * np.arange(n + 1)
+    moves, ends = np.column_stack([edges[:-1], edges[1:]]), (ups, np.ascontiguousarray(force[:, -1]))
+    return time, (reading.reshape(-1, 3), rate.reshape(-1, 3)), (S, b), moves, bias, ends
+
+
+@pytest.mark.parametrize(("share", "error"), [(None, 1e-4), (0.5, 0.02)])
+def test_moves_show_the_scale_of_a_gyro_with_exchanged_and_reversed_axes_or_improve_half_of_it(share, error):
+    rng = np.random.default_rng(7)
+    scale = 1e-3 * np.array([[0.05, -1.1, 0.0], [0.9, 0.0, 0.03], [0.0, 0.02, 1.3]])
+    given = None if share is None else share * scale
+    found = _core.scale_from_moves(*turned(6, scale, rng), given, None)
+    # Rows that are no numbers leave some milliseconds to a straight line; a given scale counts beside six moves.
+    np.testing.assert_allclose(found, scale, atol=error * np.abs(scale).max())
+
+
+def test_two_moves_show_no_scale_and_improve_a_nominal_one():
+    args = turned(2, 1.1e-3 * np.eye(3), np.random.default_rng(9))
+    assert _core.scale_from_moves(*args, None, None) is None
+    found = _core.scale_from_moves(*args, None, 1e-3)
+    assert np.linalg.norm(found - 1.1e-3 * np.eye(3)) < 0.9 * np.linalg.norm(0.1e-3 * np.eye(3))
 
 
 def test_the_share_of_a_gyro_foretells_the_changes_that_it_made_although_one_axis_is_dead():

@@ -17,8 +17,8 @@ from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.estimate.attitude import integrate_rate
-from trihedron.estimate.session.earth import left_in_move, turned_with_earth
-from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_up
+from trihedron.estimate.session.observed import left_by_earth
+from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_up, turned_with_earth
 from trihedron.read import read_recording
 from trihedron.records.published import published_figures
 from trihedron.report.calibration_fit import figures_table
@@ -288,6 +288,8 @@ def test_the_earth_rate_that_a_slow_move_turns_away_from_a_linear_bias_is_in_the
     read = np.einsum("nij,ki->knj", attitude, earth)
     linear = read[:, :1] + (time_s / 30.0)[:, None] * (read[:, -1:] - read[:, :1])
     left = np.einsum("nij,knj->kni", attitude, read - linear).sum(axis=1) * 0.05
-    variance = left_in_move(EARTH_RATE_RAD_S**2 / 3.0 * np.eye(3), time_s, rate)
+    whole, none, quiet = np.array([[0, 601]]), np.zeros((1, 3)), _core.RateNoise(np.zeros(3), 0.0, np.inf)
+    found = _core.integrate_moves(time_s, rate, whole, np.array([[0.0, 30.0]]), np.eye(3)[None], none, none, 3, quiet)
+    variance = left_by_earth(found[4], EARTH_RATE_RAD_S**2 / 3.0 * np.eye(3)[None])
     # Of 2000 times three the mean square is certain to 2 %.
-    assert np.mean(left**2) == pytest.approx(variance, rel=0.1)
+    assert np.mean(left**2) == pytest.approx(variance[0], rel=0.1)

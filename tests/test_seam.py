@@ -120,7 +120,7 @@ for kind in (_core.AllanKind.Overlapping, _core.AllanKind.Hadamard):
 edges, anchors = np.array([[3, 700], [701, 1490]]), np.array([[-1.0, 8.0], [6.0, 20.0]])
 zero = np.full((2, 3), 0.01)
 noise = _core.RateNoise(np.full(3, 1e-4), 1e-4, 0.01)
-out += _core.integrate_moves(t, w, edges, anchors, np.eye(3) * 1.01, zero, zero, 3, noise)
+out += _core.integrate_moves(t, w, edges, anchors, 1.01 * np.stack([np.eye(3)] * 2), zero, zero, 3, noise)
 for few in (readings[:37], readings[:2000]):
     fit = _core.fit_norm(few, 1e-6 * np.eye(3)[None], 9.8)
     out += [fit.S, fit.b, fit.residuals]

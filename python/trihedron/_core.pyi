@@ -161,7 +161,7 @@ def integrate_moves(
     bias_after: FloatArray,
     rate_degree: int,
     noise: RateNoise,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def integrate_raw_rate(
     time_s: FloatArray,
     gyroscope: FloatArray,
@@ -662,24 +662,16 @@ def sinusoid_power(
 ) -> FloatArray: ...
 
 # signals of effects
-def move_moments(
+def scale_from_moves(
     time_s: FloatArray,
-    reading: FloatArray,
-    direct_s: FloatArray,
-    direct_b: FloatArray,
-    rate: FloatArray,
+    sensors: tuple[FloatArray, FloatArray],
+    direct: tuple[FloatArray, FloatArray],
     moves: npt.NDArray[np.int64],
     bias: FloatArray,
-) -> list[FloatArray | None]: ...
-def rotated_moments(
-    time_s: FloatArray,
-    rate: FloatArray,
-    moves: npt.NDArray[np.int64],
-    bias: FloatArray,
-    scale: FloatArray,
-    before: FloatArray,
-    after: FloatArray,
-) -> list[FloatArray]: ...
+    ends: tuple[FloatArray, FloatArray],
+    given: FloatArray | None,
+    nominal: float | None,
+) -> FloatArray | None: ...
 def play(path: FloatArray, half_width: float) -> FloatArray: ...
 def move_derivative(time_s: FloatArray, values: FloatArray, moves: npt.NDArray[np.int64]) -> FloatArray: ...
 def move_shifted(

@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+
+from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
 
 EARTH_RATE_RAD_S = 7.292115e-5
@@ -65,3 +68,10 @@ def earth_rate_north_up(latitude_deg: float) -> tuple[float, float]:
     """Northward and upward components [rad/s] of the Earth's rotation at a latitude [deg]."""
     latitude = math.radians(latitude_deg)
     return EARTH_RATE_RAD_S * math.cos(latitude), EARTH_RATE_RAD_S * math.sin(latitude)
+
+
+def turned_with_earth(latitude_deg: float | None, up: FloatArray) -> FloatArray:
+    """Covariances (n, 3, 3) [rad²/s²] of what is not known of the Earth's rotation in poses of unknown heading with
+    directions ``up`` (n, 3)."""
+    across, along = np.square(unknown_earth_rate(latitude_deg))
+    return np.asarray(across * np.eye(3) + (along - across) * up[:, :, None] * up[:, None, :])

@@ -85,16 +85,19 @@ pub struct Turn {
     pub wrt_bias_before: Matrix3<f64>,
     /// `G` with respect to the rate bias at the anchor after, s.
     pub wrt_bias_after: Matrix3<f64>,
+    /// `G` with respect to a constant rate in the room, in the frame where the move starts, less what a bias that is
+    /// linear in time contains of it where it equals it at either end.
+    pub wrt_room: Matrix3<f64>,
     /// Covariance of `θ` from rate noise, timestamp errors and lost samples, rad².
     pub cov_noise: Matrix3<f64>,
 }
 
-/// Rotation and sensitivities of every move, in parallel, for `ω = S w' + b`, `b` linear from `bias_before` to
-/// `bias_after`, rad/s; non-finite rows and repeated timestamps are bridged.
+/// Rotation and sensitivities of every move, in parallel, for `ω = S w' + b` with a `scale` each, `b` linear from
+/// `bias_before` to `bias_after`, rad/s; non-finite rows and repeated timestamps are bridged.
 ///
 /// # Errors
 /// When the range leaves the record, the anchors coincide or time runs backward, for the first move that fails; and
-/// when there are not as many biases as moves.
+/// when there are not as many scales and biases as moves.
 #[expect(
     clippy::too_many_arguments,
     reason = "what is read and what it is integrated with"
@@ -104,25 +107,25 @@ pub fn integrate_moves(
     raw: &[Vector3<f64>],
     ranges: &[MoveRange],
     model: RateModel,
-    scale: &Matrix3<f64>,
+    scale: &[Matrix3<f64>],
     bias_before: &[Vector3<f64>],
     bias_after: &[Vector3<f64>],
     noise: &RateNoise,
 ) -> Result<Vec<Turn>> {
-    if bias_before.len() != ranges.len() || bias_after.len() != ranges.len() {
+    if [scale.len(), bias_before.len(), bias_after.len()] != [ranges.len(); 3] {
         return Err(Error::bad_input(format!(
-            "there are {} moves but {} biases before and {} after them",
+            "there are {} moves but {} scales, {} biases before and {} after them",
             ranges.len(),
+            scale.len(),
             bias_before.len(),
             bias_after.len()
         )));
     }
-    ranges
-        .par_iter()
-        .zip(bias_before.par_iter().zip(bias_after))
-        .map(|(range, (before, after))| {
-            let steps = SteppedMove::of(time_s, raw, range, model)?;
-            Ok(steps.integrate(scale, before, after, noise))
+    (0..ranges.len())
+        .into_par_iter()
+        .map(|k| {
+            let steps = SteppedMove::of(time_s, raw, &ranges[k], model)?;
+            Ok(steps.integrate(&scale[k], &bias_before[k], &bias_after[k], noise))
         })
         .collect()
 }

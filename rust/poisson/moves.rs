@@ -90,10 +90,17 @@ impl<'a> SteppedMove<'a> {
             wrt_scale: WrtScale::zeros(),
             wrt_bias_before: Matrix3::zeros(),
             wrt_bias_after: Matrix3::zeros(),
+            wrt_room: Matrix3::zeros(),
             cov_noise: Matrix3::zeros(),
         };
+        let lasts_s: f64 = self.steps.iter().map(|step| step.h).sum();
+        // ∫ R and ∫ R t/T of the attitude R = Bᵀ, by trapezoids.
+        let (mut whole, mut weighed, mut share) = (Matrix3::zeros(), Matrix3::zeros(), 0.0);
         for step in &self.steps {
             let h = step.h;
+            let (half, attitude) = (0.5 * h, turn.rotation.transpose());
+            whole += attitude * half;
+            weighed += attitude * (half * share);
             let (m0, m1) = step.moments(|k| self.raw[k]);
             let middle_s = 0.5 * (self.time_s[step.from] + self.time_s[step.to]);
             let since_s = middle_s - self.anchor_before_s;
@@ -124,7 +131,11 @@ impl<'a> SteppedMove<'a> {
                 turn.cov_noise += jump * jump.transpose() * var_time;
             }
             turn.rotation = back.transpose() * turn.rotation;
+            share += h / lasts_s;
+            whole += turn.rotation.transpose() * half;
+            weighed += turn.rotation.transpose() * (half * share);
         }
+        turn.wrt_room = Matrix3::identity() * lasts_s - whole + weighed - weighed * turn.rotation;
         turn
     }
 }

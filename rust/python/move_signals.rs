@@ -7,14 +7,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, as_vectors, flat1, flat3, matrix3, of3, vector3};
-use crate::{move_moments as kernel, move_signals};
+use crate::move_signals;
+use crate::scale_from_moves::Moves;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(play, module)?)?;
     module.add_function(wrap_pyfunction!(move_derivative, module)?)?;
     module.add_function(wrap_pyfunction!(move_shifted, module)?)?;
-    module.add_function(wrap_pyfunction!(move_moments, module)?)?;
-    module.add_function(wrap_pyfunction!(rotated_moments, module)?)?;
+    module.add_function(wrap_pyfunction!(scale_from_moves, module)?)?;
     Ok(())
 }
 
@@ -106,93 +106,54 @@ fn move_shifted<'py>(
     })
 }
 
-/// `∫ (S a + b) (w - bias)ᵀ dt` `(3, 3)` of readings `a` and rates `w` `(n, 3)` over each of the moves `(m, 2)`, with a
-/// `bias` `(m, 3)` each; `None` where fewer than two rows of a move are finite.
+/// Scale `(3, 3)` of a gyro from moves `(m, 2)`, with a `bias` `(m, 3)` and forces before and after `(m, 3)` each, and
+/// readings of both sensors `(n, 3)`: the one given, that of the moves, or the nominal one, improved along their paths.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
-    reason = "two sensors and their moves by name"
+    reason = "two sensors, their moves and the ends of these by name"
 )]
-fn move_moments<'py>(
+fn scale_from_moves<'py>(
     py: Python<'py>,
     time_s: PyReadonlyArray1<'py, f64>,
-    reading: PyReadonlyArray2<'py, f64>,
-    direct_s: PyReadonlyArray2<'py, f64>,
-    direct_b: PyReadonlyArray1<'py, f64>,
-    rate: PyReadonlyArray2<'py, f64>,
+    sensors: [PyReadonlyArray2<'py, f64>; 2],
+    direct: (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>),
     moves: PyReadonlyArray2<'py, i64>,
     bias: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Vec<Option<Array2<'py>>>> {
-    let n = time_s.len();
-    if reading.shape()[0] != n || rate.shape()[0] != n || bias.shape()[0] != moves.shape()[0] {
+    ends: [PyReadonlyArray2<'py, f64>; 2],
+    given: Option<PyReadonlyArray2<'py, f64>>,
+    nominal: Option<f64>,
+) -> PyResult<Option<Array2<'py>>> {
+    let (n, m) = (time_s.len(), moves.shape()[0]);
+    let each = [&bias, &ends[0], &ends[1]];
+    if sensors.iter().any(|one| one.shape()[0] != n) || each.iter().any(|one| one.shape()[0] != m) {
         return Err(PyValueError::new_err(
-            "readings and rates (n, 3) belong to times (n,), and a bias to every move",
+            "readings (n, 3) belong to times (n,); a bias and two forces to every move",
         ));
     }
-    let moves = edges(&moves, n)?;
+    let ranges = edges(&moves, n)?;
     let (time, reading, rate) = (
         flat1(&time_s),
-        flat3("reading", &reading)?,
-        flat3("rate", &rate)?,
+        flat3("reading", &sensors[0])?,
+        flat3("rate", &sensors[1])?,
     );
     let biases = flat3("bias", &bias)?;
-    let (scale, bias) = (matrix3("S", &direct_s)?, vector3("b", &direct_b)?);
+    let (before, after) = (flat3("before", &ends[0])?, flat3("after", &ends[1])?);
+    let direct = (matrix3("S", &direct.0)?, vector3("b", &direct.1)?);
+    let given = given.map(|scale| matrix3("given", &scale)).transpose()?;
     let found = super::run(py, || {
-        let (reading, rate) = (as_vectors(&reading), as_vectors(&rate));
-        Ok(kernel::moments(
-            &time,
-            reading,
-            (&scale, &bias),
-            rate,
-            &moves,
-            as_vectors(&biases),
-        ))
+        let pairs = as_vectors(&before).iter().zip(as_vectors(&after));
+        let ends: Vec<_> = pairs.map(|(before, after)| [*before, *after]).collect();
+        let moves = Moves {
+            time: &time,
+            reading: as_vectors(&reading),
+            direct,
+            rate: as_vectors(&rate),
+            ranges: &ranges,
+            bias: as_vectors(&biases),
+            ends: &ends,
+        };
+        Ok(moves.scale(given, nominal))
     })?;
-    let array = |moment: &Option<_>| moment.as_ref().map(|one| of3(py, one)).transpose();
-    found.iter().map(array).collect()
-}
-
-/// `∫ f (w - bias)ᵀ dt` `(m, 3, 3)` over each of the moves, of the force `f` that the rate of `scale` rotates from the
-/// pose `before` `(m, 3)` to the pose `after`.
-#[pyfunction]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "a sensor, its moves and their ends by name"
-)]
-fn rotated_moments<'py>(
-    py: Python<'py>,
-    time_s: PyReadonlyArray1<'py, f64>,
-    rate: PyReadonlyArray2<'py, f64>,
-    moves: PyReadonlyArray2<'py, i64>,
-    bias: PyReadonlyArray2<'py, f64>,
-    scale: PyReadonlyArray2<'py, f64>,
-    before: PyReadonlyArray2<'py, f64>,
-    after: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Vec<Array2<'py>>> {
-    let (n, m) = (time_s.len(), moves.shape()[0]);
-    if rate.shape()[0] != n
-        || [&bias, &before, &after]
-            .iter()
-            .any(|one| one.shape()[0] != m)
-    {
-        return Err(PyValueError::new_err(
-            "rates (n, 3) belong to times (n,); a bias and two forces to every move",
-        ));
-    }
-    let moves = edges(&moves, n)?;
-    let (time, rate, biases) = (flat1(&time_s), flat3("rate", &rate)?, flat3("bias", &bias)?);
-    let (before, after) = (flat3("before", &before)?, flat3("after", &after)?);
-    let scale = matrix3("scale", &scale)?;
-    let found = super::run(py, || {
-        let ends: Vec<_> = as_vectors(&before)
-            .iter()
-            .zip(as_vectors(&after))
-            .map(|(before, after)| [*before, *after])
-            .collect();
-        let (rate, biases) = (as_vectors(&rate), as_vectors(&biases));
-        Ok(kernel::rotated_moments(
-            &time, rate, &moves, biases, &scale, &ends,
-        ))
-    })?;
-    found.iter().map(|moment| of3(py, moment)).collect()
+    found.map(|scale| of3(py, &scale)).transpose()
 }

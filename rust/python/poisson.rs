@@ -1,13 +1,13 @@
 //! Bindings of the Poisson integration.
 
 use numpy::{
-    PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-    ToPyArray,
+    PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_vectors, flat1, flat3, matrix3, rows3, stack3, vector3};
+use super::arrays::{as_vectors, flat1, flat3, matrices3, rows3, stack3, vector3};
 use crate::poisson::{self, MoveRange, RateModel};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -80,6 +80,7 @@ type Integrated<'py> = (
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
     Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray3<f64>>,
 );
 
 #[pyfunction]
@@ -90,7 +91,7 @@ fn integrate_moves<'py>(
     gyroscope: PyReadonlyArray2<'py, f64>,
     moves: PyReadonlyArray2<'py, i64>,
     anchors_s: PyReadonlyArray2<'py, f64>,
-    scale: PyReadonlyArray2<'py, f64>,
+    scale: PyReadonlyArray3<'py, f64>,
     bias_before: PyReadonlyArray2<'py, f64>,
     bias_after: PyReadonlyArray2<'py, f64>,
     rate_degree: u8,
@@ -99,7 +100,7 @@ fn integrate_moves<'py>(
     let time_s = flat1(&time_s);
     let raw = flat3("gyroscope", &gyroscope)?;
     let ranges = ranges(&moves, &anchors_s)?;
-    let scale = matrix3("scale", &scale)?;
+    let scale = matrices3("scale", &scale)?;
     let before = rows3("bias_before", &bias_before)?;
     let after = rows3("bias_after", &bias_after)?;
     let m = ranges.len();
@@ -126,6 +127,7 @@ fn integrate_moves<'py>(
         wrt_scale.to_pyarray(py).reshape([m, 3, 9])?,
         stack3(py, turns.iter().map(|turn| turn.wrt_bias_before))?,
         stack3(py, turns.iter().map(|turn| turn.wrt_bias_after))?,
+        stack3(py, turns.iter().map(|turn| turn.wrt_room))?,
         stack3(py, turns.iter().map(|turn| turn.cov_noise))?,
     ))
 }

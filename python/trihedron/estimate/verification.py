@@ -12,7 +12,6 @@ from trihedron.errors import InputError
 from trihedron.estimate.gravity_error import norm_error
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.session.carried import carried_by, without_g_sensitivity
-from trihedron.estimate.session.earth import turned_with_earth
 from trihedron.estimate.verified_parameters import (
     common_factor,
     imprecision_findings,
@@ -22,7 +21,7 @@ from trihedron.estimate.verified_parameters import (
     uncalibrated,
 )
 from trihedron.estimate.verified_static_rate import bias_findings, expected_change, rate_findings, static_rate
-from trihedron.gravity import earth_rate_up
+from trihedron.gravity import earth_rate_up, turned_with_earth
 from trihedron.records import (
     Calibration,
     Finding,

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import AXES, FloatArray, IntArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.estimate.accelerometer.norm import N_PARAMETERS, gravity_quality
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.earth import left_by_earth, turned_with_earth
 from trihedron.estimate.session.fit import SessionSolution
-from trihedron.estimate.session.observed import Observed
+from trihedron.estimate.session.observed import Observed, left_by_earth
+from trihedron.gravity import turned_with_earth
 from trihedron.records import Calibration, FitQuality, Segments
 from trihedron.sensor_model import in_frame, norms
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
@@ -90,11 +90,20 @@ def held_out(measured: MoveMeasurements, anchors_s: FloatArray, solution: Sessio
         norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance))[holds]
     number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
     which = np.array([number[int(hold)] for hold in observed.before], dtype=np.int64)
-    models = [
-        Linear(which[fold::n_folds], S, b - S @ observed.force_origin, S_w)
-        for fold, (S, b, S_w, _) in enumerate(rests[n_folds:])
-    ]
-    return HeldOut(norm, norm_sigma, carried_each(measured, anchors_s, models))
+    n_moves = len(measured.links)
+    S_a, S_w = (np.repeat(S[None], n_moves, axis=0) for S in (solution.S_a, solution.S_w))
+    b_a = np.repeat(solution.b_a[None], n_moves, axis=0)
+    for fold, (S, b_centred, rate_scale, _) in enumerate(rests[n_folds:]):
+        at = which[fold::n_folds]
+        S_a[at], b_a[at], S_w[at] = S, b_centred - S @ observed.force_origin, rate_scale
+    seen = carried(measured, anchors_s, S_a, b_a, S_w)
+    is_fitted = np.isin(np.arange(n_moves), which)
+    moves = replace(
+        seen,
+        residual=np.where(is_fitted[:, None], seen.residual, np.nan),
+        angle_deg=np.where(is_fitted, seen.angle_deg, np.nan),
+    )
+    return HeldOut(norm, norm_sigma, moves)
 
 
 def _of_model(observed: Observed, S: FloatArray, b: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -175,60 +184,21 @@ def carried(
     """Tilt error ``B f_i - f_j`` of every move, from the pose means at both ends, with a bias per pose.
 
     The one definition of the tilt error: in sample, held out, and for a calibration verified on another session.
+    ``S_a``, ``S_w`` (3, 3) and ``b_a`` (3,) are those of all moves, or (m, 3, 3), (m, 3) of each.
     """
-    model = Linear(np.arange(len(measured.links)), S_a, b_a, S_w)
-    return carried_each(measured, anchors_s, [model])
-
-
-def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurements, segments: Segments) -> Carried:
-    """:func:`carried` with a calibration's accelerometer and averaging, and the gyro's scale ``S_w`` (3, 3)."""
-    accelerometer = calibration.accelerometer
-    read = replace(measured, rate=_core.sharpened(measured.rate, measured.time_s, calibration.averaging))
-    return carried(read, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, S_w)
-
-
-def without_g_sensitivity(measured: MoveMeasurements, own: Calibration | None) -> MoveMeasurements:
-    """The moves without the g-sensitivity that the ``own`` calibration of their recording shows, if any."""
-    shown = [] if own is None else [one for one in own.findings if one.code == "gyro-g-sensitivity"]
-    if own is None or own.gyroscope is None or not shown:
-        return measured
-    lower = in_frame(own, "lower")
-    assert lower.gyroscope is not None
-    G = np.reshape([shown[0].numbers[f"G_{i}{j}"] for i in AXES for j in AXES], (3, 3))
-    accelerometer = lower.accelerometer
-    return measured.without_g_sensitivity(np.linalg.solve(lower.gyroscope.S, G), accelerometer.S, accelerometer.b)
-
-
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """Linear models ``S_a``, ``b_a``, ``S_w`` for some ``moves`` (k,)."""
-
-    moves: IntArray
-    S_a: FloatArray
-    b_a: FloatArray
-    S_w: FloatArray
-
-
-def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list[Linear]) -> Carried:
-    """:func:`carried` of every move with the model that contains it; NaN where none does."""
     before, after = measured.links[:, 0], measured.links[:, 1]
     m = len(before)
-    rotation, wrt_before, wrt_after, cov_rate = np.zeros((4, m, 3, 3))
-    wrt_scale = np.zeros((m, 3, 9))
-    S_a, S_w, b_a = np.full((m, 3, 3), np.nan), np.zeros((m, 3, 3)), np.zeros((m, 3))
+    S_a, S_w, b_a = np.broadcast_to(S_a, (m, 3, 3)), np.broadcast_to(S_w, (m, 3, 3)), np.broadcast_to(b_a, (m, 3))
+    start, end = (np.einsum("mij,mj->mi", S_a, measured.reading[of]) + b_a for of in (before, after))
+    of_before, of_after = (-np.einsum("mij,mj->mi", S_w, measured.bias[of]) for of in (before, after))
     noise = _core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s)
-    for one in models:
-        at, bias = one.moves, -measured.bias @ one.S_w.T
-        S_a[at], b_a[at], S_w[at] = one.S_a, one.b_a, one.S_w
-        rotation[at], wrt_scale[at], wrt_before[at], wrt_after[at], cov_rate[at] = _core.integrate_moves(
-            measured.time_s, measured.rate, measured.edges[at], np.ascontiguousarray(anchors_s[at]),
-            np.ascontiguousarray(one.S_w), bias[before[at]], bias[after[at]], 3, noise,
-        )  # fmt: skip
-        earth = turned_with_earth(measured.latitude_deg, directions_of(measured.reading @ one.S_a.T + one.b_a))
-        spans = [(int(before[k]), (int(measured.edges[k, 0]), int(measured.edges[k, 1]))) for k in at]
-        cov_rate[at] += left_by_earth(measured, earth, one.S_w, spans)[:, None, None] * np.eye(3)
+    rotation, wrt_scale, wrt_before, wrt_after, wrt_room, cov_rate = _core.integrate_moves(
+        measured.time_s, measured.rate, measured.edges, np.ascontiguousarray(anchors_s), S_w, of_before, of_after, 3,
+        noise,
+    )  # fmt: skip
+    earth = turned_with_earth(measured.latitude_deg, directions_of(start))
+    cov_rate += left_by_earth(wrt_room, earth)[:, None, None] * np.eye(3)
     read = measured.reading[before], measured.reading[after]
-    start, end = (np.einsum("mij,mj->mi", S_a, one) + b_a for one in read)
     by_S = rotation[..., None] * read[0][:, None, None, :] - np.eye(3)[..., None] * read[1][:, None, None, :]
     wrt_accelerometer = np.concatenate([by_S.reshape(m, 3, 9), rotation - np.eye(3)], axis=2)
     moved = np.einsum("mij,mj->mi", rotation, start)
@@ -254,6 +224,25 @@ def carried_each(measured: MoveMeasurements, anchors_s: FloatArray, models: list
     covariance, by_noise = (one @ np.swapaxes(one, 1, 2) for one in (root, of_noise))
     floor2 = _across2(unit_end, root)
     return Carried(residual, covariance, angle, floor2, by_noise, unit_end, turn @ wrt_S, wrt_accelerometer)
+
+
+def carried_by(calibration: Calibration, S_w: FloatArray, measured: MoveMeasurements, segments: Segments) -> Carried:
+    """:func:`carried` with a calibration's accelerometer and averaging, and the gyro's scale ``S_w`` (3, 3)."""
+    accelerometer = calibration.accelerometer
+    read = replace(measured, rate=_core.sharpened(measured.rate, measured.time_s, calibration.averaging))
+    return carried(read, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b, S_w)
+
+
+def without_g_sensitivity(measured: MoveMeasurements, own: Calibration | None) -> MoveMeasurements:
+    """The moves without the g-sensitivity that the ``own`` calibration of their recording shows, if any."""
+    shown = [] if own is None else [one for one in own.findings if one.code == "gyro-g-sensitivity"]
+    if own is None or own.gyroscope is None or not shown:
+        return measured
+    lower = in_frame(own, "lower")
+    assert lower.gyroscope is not None
+    G = np.reshape([shown[0].numbers[f"G_{i}{j}"] for i in AXES for j in AXES], (3, 3))
+    accelerometer = lower.accelerometer
+    return measured.without_g_sensitivity(np.linalg.solve(lower.gyroscope.S, G), accelerometer.S, accelerometer.b)
 
 
 def _across2(up: FloatArray, root: FloatArray) -> FloatArray:

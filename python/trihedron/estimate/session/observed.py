@@ -10,8 +10,7 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.earth import left_by_earth, turned_with_earth
-from trihedron.gravity import earth_rate_up
+from trihedron.gravity import earth_rate_up, turned_with_earth
 from trihedron.records import Recording, Segments
 from trihedron.session.model import LOWER, Prior, SessionReadings
 from trihedron.session.noise import measure_noise
@@ -128,7 +127,7 @@ def arranged(
         leans = support.leans
     inverse, earth = np.linalg.inv(near[2]), turned_with_earth(recording.latitude_deg, up)
     own["pose_rate_sigma"] = np.sqrt(own["pose_rate_sigma"] ** 2 + np.einsum("ai,nij,aj->na", inverse, earth, inverse))
-    of_moves = left_by_earth(measured, earth, near[2], list(zip(before, ranges, strict=True)))
+    of_moves = left_by_earth(_wrt_room(measured, near[2], moves_before, edges), earth[moves_before])
     unresolved[:, 3] += np.outer(of_moves, np.sum(inverse**2, axis=1))
     moves = _core.SessionMoves(
         pose_time_s=pose_time_s,
@@ -153,6 +152,21 @@ def arranged(
         effect_force=np.concatenate([measured.reading, readings[kept]]) - force_origin,
         n_hidden=len(coarse), earth_up_rad_s=earth_rate_up(recording.latitude_deg),
     )  # fmt: skip
+
+
+def _wrt_room(measured: MoveMeasurements, S: FloatArray, before: IntArray, edges: IntArray) -> FloatArray:
+    """Derivatives (m, 3, 3) of rotations over ``edges`` (m, 2) by a constant rate in the room, beside linear biases."""
+    m, bias = len(edges), -measured.bias_read[before] @ S.T
+    scales, ends_s, quiet = np.repeat(S[None], m, axis=0), np.tile([0.0, 1.0], (m, 1)), np.zeros(3)
+    noise = _core.RateNoise(quiet, 0.0, np.inf)
+    return _core.integrate_moves(measured.time_s, measured.rate, edges, ends_s, scales, bias, bias, 3, noise)[4]
+
+
+def left_by_earth(wrt_room: FloatArray, earth: FloatArray) -> FloatArray:
+    """Variances (m,) [rad²] along an axis that the Earth's rotation, of covariance ``earth`` (m, 3, 3) in the pose
+    before, adds to moves beside biases that are linear between poses and contain it; ``wrt_room`` (m, 3, 3) is the
+    derivative of their rotations by it."""
+    return np.asarray(np.einsum("mij,mjk,mik->m", wrt_room, earth, wrt_room) / 3.0)
 
 
 def _effects(
