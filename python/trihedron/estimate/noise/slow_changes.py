@@ -109,7 +109,9 @@ def slow_changes(x: FloatArray, rate_hz: float, breaks: Sequence[float] = ()) ->
             break
         found.append(best)
     duration_s = len(x) / rate_hz
-    stated, plausible = min(found, key=lambda one: one.cost(EARNED)), found[-1]
+    stated = min(found, key=lambda one: one.cost(EARNED))
+    # A step is stated or absent: below its price the increments of a walk are as likely.
+    plausible = [one for one in found if one.n_steps == stated.n_steps][-1]
     return [one.changes(duration_s) for one in ((stated,) if stated is plausible else (stated, plausible))]
 
 
@@ -167,6 +169,11 @@ class Beside:
     def cost(self, price: float) -> float:
         """Deviance with ``price`` for every parameter."""
         return self.deviance + price * sum(PARAMETERS[kind] for _, kind in self.times)
+
+    @property
+    def n_steps(self) -> int:
+        """Number of steps among the changes."""
+        return sum(kind == STEP for _, kind in self.times)
 
     def changes(self, duration_s: float) -> list[SlowChange]:
         """The changes of a log of ``duration_s``."""
