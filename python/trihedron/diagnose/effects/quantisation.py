@@ -14,13 +14,14 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.probability import RARE_ALARM
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
-from trihedron.session.noise import FEWEST_READINGS
 from trihedron.session.rounding import LEAST_WHITE, TWO_CODES, UNIFORM, before_adc
 
 MOST_CODES = 0.2
 """Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
 ZONE_STEPS = 3.5
 """A dead zone is wider, in LSB, than the gap that two missing codes leave."""
+FEWEST_READINGS = 4
+"""Readings of a pose from which its codes determine a scatter."""
 LEAST_SHARE = 0.1
 """Share of the codes from which missing ones are named: exports that rescale counts lack up to 9 %, 16-bit converters 3
 to 5 %, which changes no mean."""
