@@ -203,7 +203,6 @@ class _Search:
             kept = [*best.model.terms[:k], *best.model.terms[k + 1 :]]
             beside = again(best.model, kept) if best.relations else fewer
             score = 2.0 * (best.model.log_evidence - beside.log_evidence) - term.cost
-            near = max(self.limit, score - STRONG_SCORE)
-            if score < self.limit or related(fewer, near, best.relations).score > needed:
+            if score < self.limit or related(fewer, self.limit, best.relations).score > needed:
                 return self._beside_relations(*self._pruned(fewer))
         return model, without, best

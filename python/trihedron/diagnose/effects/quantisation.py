@@ -18,6 +18,8 @@ from trihedron.session.rounding import LEAST_WHITE, TWO_CODES, UNIFORM, before_a
 
 MOST_CODES = 0.2
 """Codes per reading: with an LSB every code is read five times or more; readings without one all differ."""
+MOSTLY = 0.5
+"""Share of the static readings on one code from which a dead zone around it is tested."""
 ZONE_STEPS = 3.5
 """A dead zone is wider, in LSB, than the gap that two missing codes leave."""
 FEWEST_READINGS = 4
@@ -96,6 +98,8 @@ def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
     """Half-width of a zone around the commonest static code that no reading of the recording enters, or 0."""
     codes, counts = np.unique(values, return_counts=True)
     zero = float(codes[counts.argmax()])
+    if counts.max() < MOSTLY * len(values):
+        return 0.0
     away = np.abs(everything[everything != zero] - zero)
     if len(np.unique(away)) < 3:
         return 0.0
