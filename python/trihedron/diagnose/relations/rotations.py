@@ -9,10 +9,11 @@ from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, acting_on
 from trihedron.diagnose.relations.dependence import Column, Dependence
-from trihedron.session.drift import SLOW_S
 
 HISTORY = "last rotation"
 """Family of the last rotation."""
+TIME_CONSTANTS_S = (1.0, 2.5, 6.0, 15.0)
+"""Faster decays are over before a pose is static; slower ones retain the rotation for all of it."""
 
 
 class Decaying(Dependence):
@@ -25,10 +26,10 @@ class Decaying(Dependence):
         self.names, self.id = tuple(names), f"{self.id}{', '.join(names)}"
 
     def variants(self, context: Context) -> list[Variant]:
-        return [self._at(context, tau_s) for tau_s in SLOW_S]
+        return [self._at(context, tau_s) for tau_s in TIME_CONSTANTS_S]
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:  # noqa: ARG002
-        return self._at(context, float(np.clip(value, 0.5 * SLOW_S[0], 2.0 * SLOW_S[-1])))
+        return self._at(context, float(np.clip(value, 0.5 * TIME_CONSTANTS_S[0], 2.0 * TIME_CONSTANTS_S[-1])))
 
     def _at(self, context: Context, tau_s: float) -> Variant:
         rate = context.axis_rate
