@@ -5,7 +5,6 @@ import inspect
 import re
 import textwrap
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from trihedron.api.diagnosing import diagnose
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
-from trihedron.diagnose.residuals.effect_curves import Driver, _driven
 from trihedron.diagnose.session.solve import NO_DISTORTION
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.report.effects.catalogue import CATALOGUE, REASONS
@@ -62,15 +60,6 @@ def test_what_drives_an_effect_is_found_from_its_columns(effect_id, size, driver
         # Three standard normal numbers: 4 sigma is passed by chance once in 5000 runs.
         assert np.max(np.abs(z)) < 4.0
         assert effect.held_out[0].chi2_per_dof_after < 1.3 < effect.held_out[0].chi2_per_dof_before
-
-
-def test_a_column_along_one_direction_is_a_curve_and_one_along_two_is_none_whatever_its_unit():
-    x = np.linspace(0.0, 1.0, 200)
-    context, driver = SimpleNamespace(axis_force=np.ones((200, 3)), axis_rate=np.ones((200, 3))), Driver("time", 0, x)
-    for size in (1e-6, 1e6):
-        one = size * np.outer(x, [1.0, 0.0, 0.0])
-        assert _driven(context, [driver], one, 0).driver is driver
-        assert _driven(context, [driver], one + size * np.outer(np.cos(6.0 * x), [0.0, 1.0, 0.0]), 0) is None
 
 
 def turning(latitude, azimuth):

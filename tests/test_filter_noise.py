@@ -5,7 +5,6 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from trihedron.estimate.filter_noise.findings import noticed, too_sure, unlike_t
 from trihedron.estimate.filter_noise.left_over import PARTS, drawn_errors, mean_square, of_temperature
 from trihedron.estimate.filter_noise.strengths import Prior, _slope, bounded, fit, height, most_likely
 from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, errors_over, parts_of_walk, walked
-from trihedron.estimate.filter_noise.stretches import bias_steps, velocity_stretches
+from trihedron.estimate.filter_noise.stretches import bias_steps
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import Recording, Severity
 from trihedron.records.filter_noise import Bounded, Share, StaticNoise, TiltCheck
@@ -325,31 +324,6 @@ def test_the_greatest_posterior_is_found_from_strengths_that_are_far_off(far):
     for k, e in enumerate(np.eye(len(other))):
         both = [height([drawn(3)], off, other + sign * 1e-3 * e) for sign in (1.0, -1.0)]
         assert slope[k] == pytest.approx((both[0] - both[1]) / 2e-3, abs=0.1)
-
-
-def test_a_path_without_noise_leaves_nothing_of_the_velocity():
-    # Swings of 0.3 m/s: summed half a sample ahead of the path they left 2 mm/s rms.
-    t = np.arange(6000) / HZ
-    w, size = 2.0 * np.pi * np.array([0.23, 0.41, 0.67]), np.array([0.3, 0.2, 0.1])
-
-    def path(at):
-        return size * np.sin(w * at[:, None])
-
-    force = -(w**2) * path(t) + [0.0, 0.0, G]
-    reference = SimpleNamespace(
-        covers=lambda at: np.ones(len(at), dtype=bool), attitude=lambda at: np.tile(np.eye(3), (len(at), 1, 1)),
-        position=path,
-    )  # fmt: skip
-    side = SimpleNamespace(
-        grid=SimpleNamespace(time_s=t, step_s=1.0 / HZ), force=force, seen=np.ones(len(t), dtype=bool),
-        reference=reference,
-    )  # fmt: skip
-    point = SimpleNamespace(rate=0.0, offset_s=0.0, mounting=np.eye(3))
-    (stretch,) = velocity_stretches(side, point, 25.0, 0.0, G, 1e-6)
-    # Gravity, a bias and the velocity at the start are not what is asked here; S may not make up for anything.
-    free = stretch.columns[:, 9:18]
-    left = stretch.observed - free @ np.linalg.lstsq(free, stretch.observed, rcond=None)[0]
-    assert np.abs(left).max() < 5e-5
 
 
 def of_rest(n):

@@ -114,16 +114,6 @@ def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
     assert next_step_in_words(found) == "Record again."
 
 
-def test_a_remedy_comes_before_use_where_errors_are_several_times_the_noise():
-    own = SimpleNamespace(findings=(), gyroscope=None, accelerometer=SimpleNamespace(quality=None))
-    found, _ = found_with("timing-jitter", is_of_unit=False, domains=(DISAGREES,), calibration=own)
-    for rms, is_first in ((1.2e-3, False), (5e-3, True)):
-        own.accelerometer.quality = SimpleNamespace(rms=1e-3, floor=1e-3, held_out_rms=rms, lone_pose=None)
-        said = next_step_in_words(found)
-        assert said.startswith("Against timing jitter") == is_first
-        assert ("--extended" in said) == is_first
-
-
 @pytest.mark.parametrize(
     ("own_level", "first"), [("usable", "Check the sensor."), (None, "Use a firm support. Then: ")]
 )

@@ -22,7 +22,6 @@ from trihedron.report.calibration_charts import uncalibrated_error
 from trihedron.report.chart import Bars, Chart, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Facts, Paragraph, Picture, Section, Table
-from trihedron.report.drawn import _path
 from trihedron.report.findings import combined, findings_block
 from trihedron.report.findings.wording import filled
 from trihedron.report.layout import ticks
@@ -167,12 +166,6 @@ def test_small_numbers_have_one_notation_in_tables_and_sentences():
     for exponent, unit, printed in ((-6, "m", "µm"), (-3, "rad/s", "mrad/s"), (-6, "s²/m", "10⁻⁶ s²/m"), (0, "s", "s")):
         assert unit_with_power(exponent, unit) == printed
     assert unit_with_power(-3, "") == "10⁻³"
-
-
-def test_a_path_of_relative_steps_goes_through_its_points_and_begins_anew_after_a_gap():
-    x = np.array([0.0, 10.2, 24.8, 30.0, 7.0, 8.0, 40.0, 60.0])
-    y = np.array([5.0, -3.0, 7.0, np.nan, 1.0, np.nan, 100.0, 90.0])
-    assert _path(x, y) == "M0 5l10-8 15 10 M7 1M40 100l20-10"
 
 
 @pytest.mark.parametrize("width", [60, 80, 200])
