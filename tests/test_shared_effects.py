@@ -8,11 +8,8 @@ from scipy import stats
 
 import trihedron
 from diagnosed_session import simulated
-from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.hypothesis import AddedTerms, Term
-from trihedron.diagnose.session.solve import Distortion
-from trihedron.diagnose.shared import Information, agreement, together
+from trihedron.diagnose.hypothesis import AddedTerms
+from trihedron.diagnose.shared import agreement
 from trihedron.records import Finding, Severity
 from trihedron.report.shared_diagnosis import shared_diagnosis_report
 
@@ -26,8 +23,8 @@ def answered(A, y, size):
     spread = A @ prior @ A.T + np.eye(len(y))
     of = stats.multivariate_normal
     gain = of.logpdf(y, cov=spread) - of.logpdf(y, cov=np.eye(len(y)))
-    term = Term(catalogue()[0], Variant(Distortion(None, None), (), ()), np.full(A.shape[1], size))
-    return Information.of(AddedTerms(gain, STRENGTHS, covariance @ A.T @ y, covariance), term, term.sizes, 0.0)
+    sizes = np.full(A.shape[1], size)
+    return AddedTerms(gain, STRENGTHS, covariance @ A.T @ y, covariance).likelihood(sizes, sizes)
 
 
 def test_evidence_of_recordings_together_is_that_of_all_their_rows():
@@ -39,7 +36,7 @@ def test_evidence_of_recordings_together_is_that_of_all_their_rows():
     parts = [answered(A, y, 0.7) for A, y in zip(As, ys, strict=True)]
     A, y = np.vstack(As), np.concatenate(ys)
     for scale in (1.0, 3.0):
-        gain, value, covariance = together(parts, scale)
+        gain, value, covariance = sum(parts[1:], parts[0]).under(np.full(3, scale))
         prior = np.eye(3) * (0.7 * scale) ** 2
         of = stats.multivariate_normal
         dense = of.logpdf(y, cov=A @ prior @ A.T + np.eye(len(y))) - of.logpdf(y, cov=np.eye(len(y)))

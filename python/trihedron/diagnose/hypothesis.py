@@ -56,6 +56,27 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
+class Likelihood:
+    """Likelihood of parameters ``q``, everything else integrated out: a log-likelihood
+    ``constant + slope·q - q·precision·q/2``. Those of several recordings add (eq. 11.21)."""
+
+    constant: float
+    slope: FloatArray
+    precision: FloatArray
+
+    def __add__(self, other: Likelihood) -> Likelihood:
+        constant, slope = self.constant + other.constant, self.slope + other.slope
+        return Likelihood(constant, slope, self.precision + other.precision)
+
+    def under(self, sizes: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Log-evidence under prior σ ``sizes`` (k,); ``q`` and its covariance."""
+        covariance = np.asarray(np.linalg.inv(self.precision + np.diag(sizes**-2.0)), dtype=np.float64)
+        value: FloatArray = covariance @ self.slope
+        odds = 0.5 * np.linalg.slogdet(covariance / np.outer(sizes, sizes))[1]
+        return self.constant + 0.5 * float(self.slope @ value) + float(odds), value, covariance
+
+
+@dataclass(frozen=True, eq=False)
 class AddedTerms:
     """Result of adding columns to a hypothesis, one linear step from its fit, noise strengths refitted.
 
@@ -68,17 +89,19 @@ class AddedTerms:
     value: FloatArray
     covariance: FloatArray
 
+    def likelihood(self, known: FloatArray, unit: FloatArray) -> Likelihood:
+        """The likelihood, of a result under prior σ ``known`` (k,), of the parameters in a ``unit`` (k,)."""
+        prior, scales = np.diag((unit / known) ** 2), np.outer(unit, unit)
+        posterior = np.asarray(np.linalg.inv(self.covariance / scales), dtype=np.float64)
+        slope = posterior @ (self.value / unit)
+        odds = 0.5 * (np.linalg.slogdet(posterior)[1] - np.linalg.slogdet(prior)[1])
+        constant = self.log_evidence - 0.5 * float(slope @ (self.value / unit)) + float(odds)
+        return Likelihood(constant, slope, posterior - prior)
+
     def with_prior(self, known: FloatArray, other: FloatArray) -> AddedTerms:
-        """The result under prior σ ``other`` (k,) in place of ``known`` (k,), at the same strengths (eq. 11.21)."""
-        precision = np.linalg.inv(self.covariance)
-        changed = precision + np.diag(other**-2.0 - known**-2.0)
-        covariance = np.linalg.inv(changed)
-        shift = precision @ self.value
-        value = covariance @ shift
-        volume = np.linalg.slogdet(changed)[1] - np.linalg.slogdet(precision)[1] + 2.0 * np.log(other / known).sum()
-        return AddedTerms(
-            self.log_evidence + 0.5 * float(shift @ (value - self.value) - volume), self.strengths, value, covariance
-        )
+        """The result under prior σ ``other`` (k,) in place of ``known`` (k,), at the same strengths."""
+        gain, value, covariance = self.likelihood(known, known).under(other / known)
+        return AddedTerms(gain, self.strengths, value * known, covariance * np.outer(known, known))
 
 
 @dataclass(frozen=True, eq=False)
