@@ -71,7 +71,7 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
     for effect, without in zip(applying, bounded, strict=True):
         # Drift and scatter can absorb each other: one that is not needed may hide the size of the other.
         beside = (other for one, other in zip(applying, bounded, strict=True) if one.sensor == effect.sensor)
-        needless = [other for other in beside if other is not without and _gain(model, other) < STRONG_SCORE]
+        needless = [other for other in beside if other is not without and model.gain_over(other) < STRONG_SCORE]
         asked[effect.id] = _strength(model, effect, without, *needless)
     named = [one for one in asked.values() if one.score > limit and one.is_large]
     for sensor in range(2):
@@ -80,7 +80,7 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
             # Neither is needed beside the other: bound both; where that is unlikely the likelier one is named.
             bounds = _bounded(model.obs, model.within, {(sensor, True), (sensor, False)})
             without = again(model, model.terms, bounds)
-            gain = _gain(model, without)
+            gain = model.gain_over(without)
             if gain > limit:
                 other, likelier = sorted(both, key=lambda one: one.gain)
                 named.append(replace(likelier, gain=gain, score=gain, without=without, rivals=(other.effect.id,)))
@@ -112,13 +112,9 @@ def _bounded(obs: Observations, within: Bounds, which: Collection[tuple[int, boo
     return (corners[0], corners[1]), (scatters[0], scatters[1]), excess
 
 
-def _gain(model: Hypothesis, without: Hypothesis) -> float:
-    return 2.0 * (model.log_evidence - without.log_evidence)
-
-
 def _strength(model: Hypothesis, effect: BiasProcess, without: Hypothesis, *needless: Hypothesis) -> BiasStrength:
     """One process; ``needless`` is the hypothesis without the sensor's other one, where that is as likely."""
-    gain, alone = _gain(model, without), next(iter(needless), model)
+    gain, alone = model.gain_over(without), next(iter(needless), model)
     size, std = _size(alone, effect)
     is_large = not effect.walks or _times_error(model, effect.sensor) > FLICKER_WITHIN
     parameters, statement = effect.of_strength(size, std)

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import TINY, FloatArray
 from trihedron.diagnose.effects.contract import PRIOR_SCALES, Effect, Variant
-from trihedron.diagnose.hypothesis import AddedTerms, AtStrengths, Hypothesis, Term, again
+from trihedron.diagnose.hypothesis import AddedTerms, Hypothesis, Term, again
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import STRONG_SCORE, chdtrc
 from trihedron.threads import side_by_side
@@ -126,8 +126,8 @@ def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float, least: 
     for first in range(0, len(offered), AT_ONCE):
         terms = [term for effect in offered[first : first + AT_ONCE] for term in terms_of(model, effect, price)]
         looks = zip(terms, model.gains(terms, PRIOR_SCALES), strict=True)
-        may = [(term, look) for term, look in looks if 2.0 * float(look.gain.max()) - term.cost > least]
-        kept = _ahead([*kept, *((term, _can_be(model, term, look), look.gain) for term, look in may)])
+        may = [(term, *look) for term, look in looks if 2.0 * float(look[0].max()) - term.cost > least]
+        kept = _ahead([*kept, *((term, _can_be(model, term, look), gain) for term, gain, look in may)])
     scales = [PRIOR_SCALES[int(gain.max(axis=1).argmax())] for *_, gain in kept]
     return [term.scaled(scale) for (term, *_), scale in zip(kept, scales, strict=True)]
 
@@ -148,7 +148,7 @@ def _ahead(seen: list[tuple[Term, bool, FloatArray]]) -> list[tuple[Term, bool, 
     return list(kept.values())
 
 
-def _can_be(model: Hypothesis, term: Term, look: AtStrengths) -> bool:
+def _can_be(model: Hypothesis, term: Term, look: AddedTerms) -> bool:
     """Whether the size found in a look is plausible, or columns can be computed anew for that size."""
     effect = term.effect
     is_plausible = effect.is_plausible(term.variant, look.value, look.covariance)

@@ -105,17 +105,6 @@ class AddedTerms:
 
 
 @dataclass(frozen=True, eq=False)
-class AtStrengths:
-    """Result of adding columns at fixed noise strengths: ``gain`` (prior scales, strengths) in log-evidence over the
-    hypothesis without them at its own; ``value`` (k,) and ``covariance`` (k, k) at the first strengths and their best
-    scale."""
-
-    gain: FloatArray
-    value: FloatArray
-    covariance: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A session fitted with the effects of its ``terms``; its noise strengths are bounded by ``within``."""
 
@@ -149,15 +138,26 @@ class Hypothesis:
         rms = physical_rms(self.fitted, innovation)
         return {d: (rms[d], float(chi2[d] / n_rows[d])) for d in rms if n_rows[d] > 0.0}
 
+    @cached_property
+    def without(self) -> tuple[Hypothesis, ...]:
+        """The hypothesis without each of its terms."""
+        terms = self.terms
+        return tuple(side_by_side(lambda k: again(self, [*terms[:k], *terms[k + 1 :]]), range(len(terms))))
+
+    def gain_over(self, other: Hypothesis) -> float:
+        """Twice the log-evidence that it gains over another."""
+        return 2.0 * (self.log_evidence - other.log_evidence)
+
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
         bounds, asked = self.within if within is None else within, [_column(t.distortion, t.sizes) for t in terms]
         found = self.fitted.core.evidence(asked, [self.strengths, *ELSEWHERE], bounds)
         return [AddedTerms(*one) for one in found]
 
-    def gains(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AtStrengths]:
-        """Gain over this hypothesis of each of some terms added, at the strengths found and at ``ELSEWHERE``, prior
-        sizes times ``scales``."""
+    def gains(self, terms: Sequence[Term], scales: Sequence[float]) -> list[tuple[FloatArray, AddedTerms]]:
+        """Gain (prior scales, strengths) in log-evidence over this hypothesis of each of some terms added, at the
+        strengths found and at ``ELSEWHERE``, prior sizes times ``scales``; and its result at the strengths found and
+        their best scale."""
         wholes: dict[int, tuple[Distortion, FloatArray, list[list[int]], list[int]]] = {}
         for k, term in enumerate(terms):
             whole, part = term.variant.part_of or (term.distortion, range(term.distortion.n_parameters))
@@ -170,17 +170,17 @@ class Hypothesis:
         strengths = [self.strengths, *ELSEWHERE]
         found = self.fitted.core.candidate_gains(asked, list(scales), strengths, parts_of_each)
         order = [k for *_, own in wholes.values() for k in own]
-        return [AtStrengths(*one) for _, one in sorted(zip(order, found, strict=True), key=lambda pair: pair[0])]
+        out = sorted(zip(order, found, strict=True), key=lambda pair: pair[0])
+        at = self.log_evidence, self.strengths
+        return [(gain, AddedTerms(at[0] + float(gain[:, 0].max()), at[1], *said)) for _, (gain, *said) in out]
 
     def at_its_strengths(self, terms: Sequence[Term], scales: Sequence[float]) -> list[AddedTerms]:
         """As :meth:`with_added` at the noise strengths found: evidence with prior sizes times the best of ``scales``,
         parameters under the prior itself."""
         out = []
-        for term, look in zip(terms, self.gains(terms, scales) if terms else [], strict=True):
-            best = int(look.gain[:, 0].argmax())
-            found = AddedTerms(self.log_evidence, self.strengths, look.value, look.covariance)
-            found = found.with_prior(term.scaled(scales[best]).sizes, term.sizes)
-            out.append(replace(found, log_evidence=self.log_evidence + float(look.gain[best, 0])))
+        for term, (gain, found) in zip(terms, self.gains(terms, scales) if terms else [], strict=True):
+            own = found.with_prior(term.sizes * scales[int(gain[:, 0].argmax())], term.sizes)
+            out.append(replace(own, log_evidence=found.log_evidence))
         return out
 
     def plain(self, strengths: Sequence[Strengths]) -> float:
@@ -235,11 +235,6 @@ def again(
     ``strengths``."""
     within = known.within if within is None else within
     return hypothesis(known.obs, known.fitted.state, known.fitted.prior, terms, within, strengths or known.strengths)
-
-
-def without_each(known: Hypothesis) -> tuple[Hypothesis, ...]:
-    terms = known.terms
-    return tuple(side_by_side(lambda k: again(known, [*terms[:k], *terms[k + 1 :]]), range(len(terms))))
 
 
 def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:

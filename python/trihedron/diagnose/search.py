@@ -25,7 +25,7 @@ from trihedron.diagnose.candidates import (
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import SENSORS, Effect
-from trihedron.diagnose.hypothesis import Hypothesis, again, without_each
+from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.diagnose.relations.search import Related, related
 from trihedron.probability import STRONG_SCORE
 
@@ -122,25 +122,22 @@ class _Search:
         tried = [one for one in tried if not isinstance(one.term.effect, BiasProcess)]
         for process in bias_strengths(model, self.alpha)[0] if tried else ():
             standing = explain_as_much(process, model, tried)
-            larger, chosen = with_best(model, standing) if standing else (model, None)
+            larger, chosen = with_best(model, standing)
             if chosen is None:
                 continue
             bounded = again(larger, larger.terms, bounds_without(larger, process.effect))
             least = again(bounded, bounded.terms[:-1])
-            is_likelier = 2.0 * (bounded.log_evidence - model.log_evidence) - chosen.cost > -process.price
-            gained = 2.0 * (bounded.log_evidence - least.log_evidence) - chosen.cost
-            if is_likelier and gained > self.limit and bounded.is_shown(least, len(model.terms)):
+            gains = bounded.gain_over(model) + process.price, bounded.gain_over(least) - self.limit
+            if min(gains) > chosen.cost and bounded.is_shown(least, len(model.terms)):
                 return bounded
         return None
 
     def concluded(self, model: Hypothesis) -> Found:
         """Remove effects that others made redundant, exchange each for the best of its rivals, and score all candidates
         beside the answer."""
-        model, without = self._pruned(model)
-        swapped, rivals, against = self._swapped(model, without)
-        if swapped is not model:
-            model, without = self._pruned(swapped)
-        model, without, beside = self._beside_relations(model, without)
+        model = self._pruned(model)
+        swapped, rivals, against = self._swapped(model)
+        model, beside = self._beside_relations(model if swapped is model else self._pruned(swapped))
         stated, missing = all_beside(model, self.effects)
         # Results with noise strengths refitted replace those at the strengths of the answer, of an effect the best.
         # Rivals of a bias process, which pays the same price, are those down to ``STRONG_SCORE`` below it.
@@ -150,31 +147,27 @@ class _Search:
         return Found(
             model, beside, {one.term.effect.id: one for one in tried},
             {key: other for key, other in against.items() if other in held and key not in held}, missing,
-            frozenset(self.dropped), tuple(2.0 * (model.log_evidence - one.log_evidence) for one in without), without,
+            frozenset(self.dropped), tuple(model.gain_over(one) for one in model.without), model.without,
             tuple(rivals.get(term.effect.id, ()) for term in model.terms),
         )  # fmt: skip
 
-    def _pruned(self, model: Hypothesis) -> tuple[Hypothesis, tuple[Hypothesis, ...]]:
-        """The hypothesis without terms that the others made redundant, the lowest score removed first; and without each
-        of the others."""
+    def _pruned(self, model: Hypothesis) -> Hypothesis:
+        """The hypothesis without terms that the others made redundant, the lowest score removed first."""
         while True:
-            without = without_each(model)
             scores = [
-                2.0 * (model.log_evidence - one.log_evidence) - term.cost if model.is_shown(one, k) else -np.inf
-                for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
+                model.gain_over(one) - term.cost if model.is_shown(one, k) else -np.inf
+                for k, (term, one) in enumerate(zip(model.terms, model.without, strict=True))
             ]
             if not scores or min(scores) > self.limit:
-                return model, without
-            model = without[int(np.argmin(scores))]
+                return model
+            model = model.without[int(np.argmin(scores))]
 
-    def _swapped(
-        self, model: Hypothesis, without: Sequence[Hypothesis]
-    ) -> tuple[Hypothesis, dict[str, tuple[str, ...]], dict[str, str]]:
+    def _swapped(self, model: Hypothesis) -> tuple[Hypothesis, dict[str, tuple[str, ...]], dict[str, str]]:
         """Exchange every term for its best rival beside all others. By id: rivals that explain as much as a term, and
         the term that stands in the place of a candidate."""
         rivals: dict[str, tuple[str, ...]] = {}
         against: dict[str, str] = {}
-        for k, fewer in enumerate(without):
+        for k, fewer in enumerate(model.without):
             term = model.terms[k]
             scored = [(2.0 * model.log_evidence - term.cost, model, term)]
             tried = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms} - {term.effect.id})
@@ -192,17 +185,15 @@ class _Search:
             against.pop(chosen.effect.id, None)
         return model, rivals, against
 
-    def _beside_relations(
-        self, model: Hypothesis, without: tuple[Hypothesis, ...]
-    ) -> tuple[Hypothesis, tuple[Hypothesis, ...], Related]:
+    def _beside_relations(self, model: Hypothesis) -> tuple[Hypothesis, Related]:
         """Relations without a mechanism. An effect goes where it is not needed beside them, or where one more in its
         place scores more; where none stands beside it, as it resembles one, clearly more."""
         best = related(model, self.limit)
         needed = best.score + (0.0 if best.relations else STRONG_SCORE)
-        for k, (term, fewer) in enumerate(zip(model.terms, without, strict=True)):
+        for k, (term, fewer) in enumerate(zip(model.terms, model.without, strict=True)):
             kept = [*best.model.terms[:k], *best.model.terms[k + 1 :]]
             beside = again(best.model, kept) if best.relations else fewer
-            score = 2.0 * (best.model.log_evidence - beside.log_evidence) - term.cost
+            score = best.model.gain_over(beside) - term.cost
             if score < self.limit or related(fewer, self.limit, best.relations).score > needed:
-                return self._beside_relations(*self._pruned(fewer))
-        return model, without, best
+                return self._beside_relations(self._pruned(fewer))
+        return model, best
