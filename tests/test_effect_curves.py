@@ -17,7 +17,7 @@ from trihedron.api.diagnosing import diagnose
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.effects.earth_rate import EarthRate, nearest_turning
-from trihedron.diagnose.session.solve import NO_DISTORTION
+from trihedron.diagnose.session.solve import Distortion
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.report.effects.catalogue import CATALOGUE, REASONS
 from trihedron.report.findings.wording import places
@@ -85,7 +85,7 @@ def test_errors_of_latitude_and_north_are_those_they_say(sigma):
 
 def test_a_vector_that_is_not_the_earths_is_not_called_so():
     effect, sigma = EarthRate(), np.diag(np.square([3e-6, 3e-6, 3e-6]))
-    at_home, here = Variant(NO_DISTORTION, ("x", "y", "z"), ("rad/s",) * 3), np.radians(35.0)
+    at_home, here = Variant(Distortion(None, None), ("x", "y", "z"), ("rad/s",) * 3), np.radians(35.0)
     assert effect.is_plausible(at_home, turning(here, 1.0), sigma)
     assert effect.is_plausible(at_home, turning(-here, 1.0), sigma)
     assert not effect.is_plausible(at_home, 2.0 * turning(here, 1.0), sigma)

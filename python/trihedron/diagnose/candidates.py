@@ -161,23 +161,25 @@ def worth_fitting(tried: Sequence[Tried]) -> list[Tried]:
     return [one for one in tried if one.score > min(first - STRONG_SCORE, OF_THE_BEST * first)]
 
 
-def with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
+def fitted_near(model: Hypothesis, tried: Sequence[Tried], k: int) -> list[Hypothesis]:
+    """The hypothesis with each of the candidates near the first, fitted in full, in the place of its term ``k``, or one
+    more; where its size is plausible."""
+    terms, near = model.terms, worth_fitting(tried)[:N_LEADERS]
+    fewer = model.without[k] if near and k < len(terms) else model
+
+    def fitted(one: Tried) -> Hypothesis:
+        term = as_fits_best(fewer, one)
+        return again(model, [*terms[:k], term, *terms[k + 1 :]], strengths=one.asked.strengths)
+
+    made = side_by_side(fitted, near)
+    return [one for one in made if one.terms[k].effect.is_plausible(one.terms[k].variant, *one.value(k))]
+
+
+def with_best(model: Hypothesis, standing: Sequence[Tried]) -> tuple[Hypothesis, Term | None]:
     """The hypothesis with the best of the candidates near the first, each fitted in full."""
-    near = worth_fitting(standing)[:N_LEADERS]
-    best: tuple[float, Hypothesis, Term] | None = None
-    for term, larger in side_by_side(lambda one: _fitted_beside(model, one), near):
-        value, covariance = larger.value(len(larger.terms) - 1)
-        if not term.effect.is_plausible(term.variant, value, covariance):
-            continue
-        score = 2.0 * larger.log_evidence - term.cost
-        if best is None or score > best[0]:
-            best = score, larger, term
-    return (model, None) if best is None else best[1:]
-
-
-def _fitted_beside(model: Hypothesis, tried: Tried) -> tuple[Term, Hypothesis]:
-    term = as_fits_best(model, tried)
-    return term, again(model, [*model.terms, term], strengths=tried.asked.strengths)
+    made = fitted_near(model, standing, len(model.terms))
+    best = max(made, key=lambda one: one.score(-1), default=None)
+    return (model, None) if best is None else (best, best.terms[-1])
 
 
 # Shape parameters of an effect (a time constant, a delay): fitted, then carried as unknowns.
@@ -242,12 +244,10 @@ def renewed(model: Hypothesis) -> Hypothesis:
 
 
 def _renewed(model: Hypothesis, term: Term) -> Term:
-    """A term with its columns computed from the motion of a hypothesis."""
-    known = term.variant
     if not term.effect.is_of_true_motion:
         return term
-    same = (one for one in term.effect.variants(model.context) if (one.label, one.names) == (known.label, known.names))
-    return replace(term, variant=next(same))
+    known = term.variant.label, term.variant.names
+    return replace(term, variant=next(v for v in term.effect.variants(model.context) if (v.label, v.names) == known))
 
 
 def with_shapes(model: Hypothesis) -> Hypothesis:

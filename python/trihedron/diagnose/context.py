@@ -274,33 +274,25 @@ class Context:
         return out
 
     @cached_property
-    def pose_attitude(self) -> FloatArray:
-        """(poses, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves, levelled in each pose.
+    def attitude(self) -> FloatArray:
+        """(points, 3, 3) local level (z up, arbitrary azimuth) → body, rotated by the gyro in moves, levelled in poses.
 
         Poses that no chain of moves reaches have NaN but for the vertical, which gravity shows.
         """
-        obs, up, turned = self.obs, self.fitted.state.up, self.turned
-        out = np.full((obs.n_poses, 3, 3), np.nan)
+        obs, up, out = self.obs, self.fitted.state.up, self.turned
 
         def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
             x = x_guess - up * (up @ x_guess)
             x /= np.linalg.norm(x)
             return np.stack([x, np.cross(up, x), up], axis=1)
 
-        out[:, :, 2] = up
+        out[: obs.n_poses] = np.nan
+        out[: obs.n_poses, :, 2] = up
         out[0] = levelled(np.eye(3)[np.abs(up[0]).argmin()], up[0])
         for where, (before, after) in zip(self.moves, obs.move_poses, strict=True):
+            out[where] = out[where] @ out[before]
             if np.isfinite(out[before]).all():
-                out[after] = levelled(turned[where.stop - 1] @ out[before][:, 0], up[after])
-        return out
-
-    @cached_property
-    def attitude(self) -> FloatArray:
-        """(points, 3, 3) :attr:`pose_attitude`, in moves rotated on by the gyro from the pose before."""
-        poses, out = self.pose_attitude, self.turned
-        out[: len(poses)] = poses
-        for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
-            out[where] = out[where] @ poses[before]
+                out[after] = levelled(out[where.stop - 1][:, 0], up[after])
         return out
 
     @cached_property

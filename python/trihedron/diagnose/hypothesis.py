@@ -148,6 +148,10 @@ class Hypothesis:
         """Twice the log-evidence that it gains over another."""
         return 2.0 * (self.log_evidence - other.log_evidence)
 
+    def score(self, k: int) -> float:
+        """Twice the log-evidence, less the correction for the choice of term ``k``: among others in its place."""
+        return 2.0 * self.log_evidence - self.terms[k].cost
+
     def with_added(self, terms: Sequence[Term], within: Bounds | None = None) -> list[AddedTerms]:
         """Evidence of the hypothesis with each of some terms added, noise strengths refitted ``within`` bounds."""
         bounds, asked = self.within if within is None else within, [_column(t.distortion, t.sizes) for t in terms]

@@ -13,11 +13,10 @@ import numpy as np
 
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
 from trihedron.diagnose.candidates import (
-    N_LEADERS,
     Tried,
     all_beside,
-    as_fits_best,
     candidates_beside,
+    fitted_near,
     price_of_choice,
     with_best,
     worth_fitting,
@@ -168,21 +167,16 @@ class _Search:
         rivals: dict[str, tuple[str, ...]] = {}
         against: dict[str, str] = {}
         for k, fewer in enumerate(model.without):
-            term = model.terms[k]
-            scored = [(2.0 * model.log_evidence - term.cost, model, term)]
-            tried = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms} - {term.effect.id})
-            rivals_of_it = [one for one in worth_fitting(tried) if one.term.effect.id != term.effect.id]
-            for other in rivals_of_it[:N_LEADERS]:
-                fitted = as_fits_best(fewer, other)
-                changed = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
-                if fitted.effect.is_plausible(fitted.variant, *changed.value(k)):
-                    scored.append((2.0 * changed.log_evidence - fitted.cost, changed, fitted))
-            _, model, chosen = max(scored, key=lambda one: one[0])
-            least = model.log_evidence - 0.5 * STRONG_SCORE
-            beside = (t.effect.id for _, one, t in scored if one.log_evidence > least and t.effect is not chosen.effect)
-            rivals[chosen.effect.id] = tuple(dict.fromkeys(beside))
-            against |= {one.term.effect.id: chosen.effect.id for one in tried if one.score > self.limit}
-            against.pop(chosen.effect.id, None)
+            own = model.terms[k].effect.id
+            tried = candidates_beside(fewer, self.effects, {one.effect.id for one in model.terms} - {own})
+            others = [one for one in worth_fitting(tried) if one.term.effect.id != own]
+            made = [model, *fitted_near(model, others, k)]
+            model = max(made, key=lambda one: one.score(k))
+            chosen = model.terms[k].effect.id
+            near = (one.terms[k].effect.id for one in made if model.gain_over(one) < STRONG_SCORE)
+            rivals[chosen] = tuple(key for key in dict.fromkeys(near) if key != chosen)
+            against |= {one.term.effect.id: chosen for one in tried if one.score > self.limit}
+            against.pop(chosen, None)
         return model, rivals, against
 
     def _beside_relations(self, model: Hypothesis) -> tuple[Hypothesis, Related]:

@@ -55,22 +55,17 @@ class Distortion:
         return Distortion(force, rate)
 
 
-NO_DISTORTION = Distortion(None, None)
-
-
-def stacked(parts: list[Distortion]) -> Distortion:
+def stacked(parts: Sequence[Distortion]) -> Distortion:
     """Several distortions side by side."""
-    parts = [p for p in parts if p.n_parameters]
-    if len(parts) < 2:
-        return parts[0] if parts else NO_DISTORTION
+    if len(parts) == 1:
+        return parts[0]
 
     def side(name: str) -> FloatArray | None:
-        given = [getattr(p, name) for p in parts]
-        if all(g is None for g in given):
+        given = [(getattr(p, name), p.n_parameters) for p in parts]
+        n = next((len(g) for g, _ in given if g is not None), None)
+        if n is None:
             return None
-        n = next(len(g) for g in given if g is not None)
-        sides = zip(given, parts, strict=True)
-        return np.concatenate([np.zeros((n, 3, p.n_parameters)) if g is None else g for g, p in sides], axis=2)
+        return np.concatenate([np.zeros((n, 3, k)) if g is None else g for g, k in given], axis=2)
 
     return Distortion(side("force"), side("rate"))
 
