@@ -54,8 +54,7 @@ class Answer:
 
     @property
     def ids(self) -> set[str]:
-        terms = {term.effect.id for term in self.found.model.terms}
-        return terms | {one.effect.id for one in self.biases} | self.seen.keys()
+        return {effect.id for effect, *_ in self.gains}
 
     @property
     def gains(self) -> list[tuple[Effect, float, float | None]]:
@@ -69,11 +68,11 @@ class Answer:
     @property
     def shares(self) -> list[float]:
         """Share of the misfit explained by each: its gain over the sum of all gains, of the relations beside them, and
-        the remaining ``excess``."""
-        gains = self.gains
-        whole = sum(max(gain, 0.0) for _, gain, own in gains if own is None)
-        whole = max(whole + sum(one.score for one in self.found.related.relations) + excess(self.judged), TINY)
-        return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
+        the remaining excess: χ² beyond the degrees of freedom, over the domains where it is positive."""
+        chi2, dof = misfits(self.judged.core)
+        whole = float(np.maximum(chi2 - dof, 0.0).sum()) + sum(one.score for one in self.found.related.relations)
+        whole = max(whole + sum(max(gain, 0.0) for _, gain, own in self.gains if own is None), TINY)
+        return [max(gain, 0.0) / whole if own is None else own for _, gain, own in self.gains]
 
     @property
     def beside(self) -> set[str]:
@@ -99,18 +98,9 @@ class Answer:
         )
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False
-        is_weak = [effect.is_minor for effect, *_ in self.gains]
-        is_minor = [
-            share < HEADLINE and (own is not None or weak or effect.id in self.beside)
-            for (effect, _, own), share, weak in zip(self.gains, self.shares, is_weak, strict=True)
-        ]
-        return not all(is_weak) and not all(is_minor)
-
-
-def excess(fitted: Fit) -> float:
-    """Chi-square beyond the degrees of freedom, summed over the domains where it is positive."""
-    chi2, dof = misfits(fitted.core)
-    return float(np.maximum(chi2 - dof, 0.0).sum())
+        is_faint = [own is not None or effect.is_minor or effect.id in self.beside for effect, _, own in self.gains]
+        is_reason = [share >= HEADLINE or not faint for share, faint in zip(self.shares, is_faint, strict=True)]
+        return any(is_reason) and not all(effect.is_minor for effect, *_ in self.gains)
 
 
 def accepted_effects(answer: Answer, residuals: Sequence[DomainResiduals]) -> tuple[AcceptedEffect, ...]:

@@ -46,8 +46,6 @@ class BiasStrength:
     statement: Words
     without: Hypothesis
     alone: Hypothesis
-    price: float
-    """Selection penalty of a catalogue effect, in twice a log-likelihood; it applies to a named process too."""
     is_large: bool
     """Whether a drift exceeds that of 1/f noise (``FLICKER_WITHIN``)."""
     rivals: tuple[str, ...] = ()
@@ -122,8 +120,7 @@ def _strength(model: Hypothesis, effect: BiasProcess, without: Hypothesis, *need
     # fitted strength, with a relative uncertainty of 1/sqrt(2n), and has the penalty of a parameter.
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
     cost = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
-    price = price_of_choice(model, catalogue())
-    return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, alone, price, is_large)
+    return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, alone, is_large)
 
 
 def _flicker(obs: Observations) -> FloatArray:
@@ -172,11 +169,12 @@ def explain_as_much(one: BiasStrength, model: Hypothesis, tried: Iterable[Tried]
         columns = other.term.distortion
         return (columns.force, columns.rate)[one.effect.sensor] is not None and other.term.effect.id != one.effect.id
 
+    least = -STRONG_SCORE - price_of_choice(model, catalogue())
     # Bounds can only lower the evidence: only candidates that are near without them are evaluated.
-    near = [other for other in tried if acts(other) and other.score + one.price > -STRONG_SCORE]
+    near = [other for other in tried if acts(other) and other.score > least]
     asked = model.with_added([other.term for other in near], bounds_without(model, one.effect)) if near else []
     found = [
         replace(other, score=2.0 * (bounded.log_evidence - model.log_evidence) - other.term.cost, asked=bounded)
         for other, bounded in zip(near, asked, strict=True)
     ]
-    return sorted((other for other in found if other.score + one.price > -STRONG_SCORE), key=lambda other: -other.score)
+    return sorted((other for other in found if other.score > least), key=lambda other: -other.score)

@@ -19,7 +19,6 @@ from trihedron.diagnose.effects.contract import GYRO, SENSORS, Evidence
 from trihedron.diagnose.effects.timing_jitter import common_time_variance
 from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.relations.records import noise_relations, records
-from trihedron.diagnose.relations.search import Related
 from trihedron.diagnose.residuals.effect_curves import residuals_before_after
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED, judge_rows
 from trihedron.diagnose.residuals.within_poses import judge_within_poses, within_limit
@@ -155,10 +154,11 @@ def _run(obs: Observations, start: SessionState, prior: Prior | None, alpha: flo
     if "accel-hysteresis" in answer.ids:
         settles = {domain: p for domain, p in settles.items() if domain != "within-static"}
     rows, inside = (_disagreeing(some, settles) for some in (judge_rows(judged.fitted, alpha), of_samples))
-    remaining = with_relations((*rows, *_explained(answer, inside)), found.related)
-    if not answer.ids:
-        domains = remaining  # nothing was added to the linear model: one judgement of it
-    return replace(answer, domains=with_relations(domains, found.related), remaining=remaining)
+    # Domains in which a relation shows disagree.
+    follows = {one.effect.domain: math.exp(-0.5 * one.score) for one in found.related.relations}
+    remaining = _disagreeing((*rows, *_explained(answer, inside)), follows)
+    # Where nothing was added to the linear model there is one judgement of it.
+    return replace(answer, domains=_disagreeing(domains, follows) if answer.ids else remaining, remaining=remaining)
 
 
 def _on_support(plain: Hypothesis, alpha: float) -> tuple[Hypothesis, dict[Domain, float]]:
@@ -215,11 +215,6 @@ def _explained(answer: Answer, of_samples: Sequence[DomainTest]) -> list[DomainT
     explained = {one.domain for one in answer.seen.values()}
     explained |= {domain for one in catalogue() if one.id in answer.ids for domain in one.accounts_for}
     return [replace(d, disagrees=False) if d.domain in explained else d for d in of_samples]
-
-
-def with_relations(domains: tuple[DomainTest, ...], found: Related) -> tuple[DomainTest, ...]:
-    """The domains, where those in which a relation shows disagree."""
-    return _disagreeing(domains, {one.effect.domain: float(np.exp(-0.5 * one.score)) for one in found.relations})
 
 
 def verdict_of(answer: Answer, *, has_relations: bool, is_determined: bool) -> Verdict:

@@ -116,7 +116,7 @@ class _Search:
         With such an effect the bias process is no stronger than the part's own noise explains.
         """
         model = found.model
-        near = -STRONG_SCORE - price_of_choice(model, self.effects)
+        near, price = -STRONG_SCORE - price_of_choice(model, self.effects), price_of_choice(model, catalogue())
         tried = [one for one in found.tried.values() if one.score > near]
         tried = [one for one in tried if not isinstance(one.term.effect, BiasProcess)]
         for process in bias_strengths(model, self.alpha)[0] if tried else ():
@@ -126,7 +126,7 @@ class _Search:
                 continue
             bounded = again(larger, larger.terms, bounds_without(larger, process.effect))
             least = again(bounded, bounded.terms[:-1])
-            gains = bounded.gain_over(model) + process.price, bounded.gain_over(least) - self.limit
+            gains = bounded.gain_over(model) + price, bounded.gain_over(least) - self.limit
             if min(gains) > chosen.cost and bounded.is_shown(least, len(model.terms)):
                 return bounded
         return None
