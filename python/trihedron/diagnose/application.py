@@ -103,10 +103,8 @@ def compensate(
             if variant is None:
                 continue
             values = np.asarray(entry["model"]["values"], dtype=np.float64)
-            if variant.distortion.force is not None:
-                force = force - variant.distortion.force @ values
-            if variant.distortion.rate is not None:
-                rate = rate - variant.distortion.rate @ values
+            sides = (force, variant.distortion.force), (rate, variant.distortion.rate)
+            force, rate = (read if of is None else read - of @ values for read, of in sides)
     return Compensated(
         None if raw_f is None else raw_f + np.linalg.solve(S_f, (force - read_f).T).T,
         recording.gyroscope if raw_w is None else raw_w + np.linalg.solve(S_w, (rate - read_w).T).T,

@@ -104,9 +104,10 @@ def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
 def _bounded(obs: Observations, within: Bounds, which: Collection[tuple[int, bool]]) -> Bounds:
     """Bounds, those of some processes (sensor, whether it walks) replaced by what the part's own noise explains."""
     corner, scatter, excess = within
-    expected = _flicker(obs)
+    # 1/f noise inside the poses explains so much; scatter below the standard error of a pose mean shows in none.
+    flicker = FLICKER_WITHIN * np.array([obs.force_scatter, obs.rate_scatter]) / obs.scatter_unit()[:, 0]
     corners = [NOISE_CORNER_S if (s, True) in which else corner[s] for s in range(2)]
-    scatters = [float(expected[s]) if (s, False) in which else scatter[s] for s in range(2)]
+    scatters = [max(float(flicker[s]), 1.0) if (s, False) in which else scatter[s] for s in range(2)]
     return (corners[0], corners[1]), (scatters[0], scatters[1]), excess
 
 
@@ -121,13 +122,6 @@ def _strength(model: Hypothesis, effect: BiasProcess, without: Hypothesis, *need
     n_strengths = 3 if effect.sensor == 1 and not effect.walks else 1
     cost = (n_strengths - 1) * float(np.log(2.0 * max(model.obs.n_poses, 1)))
     return BiasStrength(effect, gain, gain - cost, size, std, parameters, statement, without, alone, is_large)
-
-
-def _flicker(obs: Observations) -> FloatArray:
-    """(2,) largest scatter from pose to pose that 1/f noise inside the poses explains, in units of ``scatter_unit``."""
-    expected = np.array([obs.force_scatter, obs.rate_scatter])
-    # Scatter below the standard error of a pose mean shows in none.
-    return np.maximum(FLICKER_WITHIN * expected / obs.scatter_unit()[:, 0], 1.0)
 
 
 def _times_error(model: Hypothesis, sensor: int) -> float:

@@ -68,7 +68,7 @@ def threshold(alpha: float) -> float:
 def search(base: Hypothesis, alpha: float, effects: Sequence[Effect] | None = None) -> Found:
     """The effects of a session: the best of the catalogue, or of ``effects``, is added repeatedly, then each is removed
     or exchanged if that is better."""
-    one = _Search(alpha, catalogue() if effects is None else effects)
+    one = _Search(alpha, threshold(alpha), catalogue() if effects is None else effects)
     found = one.concluded(one.added(base))
     # One process of either sensor may be replaced by effects.
     for _ in SENSORS:
@@ -81,21 +81,17 @@ def search(base: Hypothesis, alpha: float, effects: Sequence[Effect] | None = No
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """A search among ``effects``; ``dropped`` are ids of those that lower no held-out rms."""
+    """A search among ``effects``, accepted above ``limit``; ``dropped`` are ids of those that lower no held-out rms."""
 
     alpha: float
+    limit: float
     effects: Sequence[Effect]
     dropped: set[str] = field(default_factory=set)
 
-    @property
-    def limit(self) -> float:
-        return threshold(self.alpha)
-
     def added(self, model: Hypothesis) -> Hypothesis:
         """The hypothesis with effects added one at a time until none scores above the threshold."""
-        larger: Hypothesis | None = model
-        while larger is not None:
-            model, larger = larger, self._with_one_more(larger)
+        while (larger := self._with_one_more(model)) is not None:
+            model = larger
         return model
 
     def _with_one_more(self, model: Hypothesis) -> Hypothesis | None:
