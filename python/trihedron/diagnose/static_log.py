@@ -6,6 +6,7 @@ axes, as a gyro does in static poses: effects, noise strengths and evidence are 
 """
 
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from types import MappingProxyType
 from typing import Any
 
@@ -31,13 +32,12 @@ from trihedron.diagnose.session.solve import Distortion
 from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
-from trihedron.records.domains import Domain, DomainResiduals, DomainTest, Where
+from trihedron.records.domains import DomainResiduals, DomainTest, Where
 from trihedron.records.words import why_not
 from trihedron.sensor_model import axis_scales
 from trihedron.session.model import LOWER, Prior
 from trihedron.units import rate_to_si
 
-DOMAINS: tuple[Domain, Domain] = ("static-accel", "static-gyro")
 Pieces = tuple[Segments, IntArray]
 """Static pieces as poses, and the orientation (n,) of each."""
 
@@ -64,11 +64,10 @@ def diagnose_static_log(
         *(effect for side in sides for effect in side.effects),
         *(line for _, line in within if line is not None),
     ]
-    noise: dict[str, Any] = {"accelerometer_density": [0.0] * 3, "accelerometer_unit": "m/s^2/sqrt(Hz)",
-                             "accelerometer_corner_s": None, "gyroscope_density": None,
-                             "gyroscope_unit": "rad/s/sqrt(Hz)", "gyroscope_corner_s": None}  # fmt: skip
-    for name, side in zip(("accelerometer", "gyroscope"), sides, strict=False):
-        noise[f"{name}_density"] = side.plain.context.noise_density[GYRO].tolist()
+    densities = [side.plain.context.noise_density[GYRO].tolist() for side in sides] or [[0.0] * 3]
+    noise: dict[str, Any] = {}
+    for (_, _, name, unit, _), density in zip_longest(SENSORS, densities):
+        noise |= {f"{name}_density": density, f"{name}_unit": f"{unit}/sqrt(Hz)", f"{name}_corner_s": None}
     calm = [test if line is None else replace(test, disagrees=False, where=Where()) for test, line in within]
     return Diagnosis(
         verdict="missing-physics" if effects else "not-testable",
@@ -109,7 +108,7 @@ def _judged(
     processes = [] if terms else bias_strengths(known, alpha)[0]
     walks = [one for one in processes if one.effect.sensor == GYRO and one.effect.walks]
     every = residuals_before_after(plain.fitted, known.fitted, {GYRO} if walks else ())
-    shown = next(one for one in every if one.domain == DOMAINS[GYRO])
+    shown = next(one for one in every if one.domain == SENSORS[GYRO].domain)
     explained = float(np.clip(1.0 - (shown.after**2).sum() / (shown.before**2).sum(), 0.0, 1.0))
     gains = [*found.gains, *(one.gain for one in walks)]
     candidates = [tried_candidate(one, found.against.get(key), "") for key, one in found.tried.items()]
@@ -213,11 +212,10 @@ def _aside(effect: Effect, sensor: int, orientation: IntArray, count: float) -> 
 
 def _of_sensor(effect: AcceptedEffect, sensor: int, unit: str, share: float) -> AcceptedEffect:
     """The record with the sensor's own domain, channel and unit in place of the gyro's."""
-    given = SENSORS[sensor].unit
-    parameters = tuple(replace(one, unit=one.unit.replace(given, unit)) for one in effect.parameters)
-    held = tuple(replace(one, domain=DOMAINS[sensor], unit=unit) for one in effect.held_out if one.domain == DOMAINS[1])
-    name: Any = ("accelerometer", "gyroscope")[sensor]
-    curves = tuple(replace(one, sensor=name) for one in effect.curves)
+    own, shown = SENSORS[sensor], SENSORS[GYRO].domain
+    parameters = tuple(replace(one, unit=one.unit.replace(own.unit, unit)) for one in effect.parameters)
+    held = tuple(replace(one, domain=own.domain, unit=unit) for one in effect.held_out if one.domain == shown)
+    curves = tuple(replace(one, sensor=own.name) for one in effect.curves)
     return replace(effect, share=share, parameters=parameters, held_out=held, curves=curves)
 
 
@@ -246,7 +244,7 @@ def _domain(sensor: int, x: FloatArray, shown: DomainResiduals, unit: str, *, is
     where = Where(("ag"[sensor] + AXES[int(z.std(axis=0).argmax())],)) if is_named else Where()
     rms = rms_of(x)
     disagrees = p < FALSE_ALARM / N_DOMAINS_TESTED
-    return DomainTest(DOMAINS[sensor], chi2, float(x.size), p, disagrees, where, rms, unit)
+    return DomainTest(SENSORS[sensor].domain, chi2, float(x.size), p, disagrees, where, rms, unit)
 
 
 def _lines(plain: Hypothesis, obs: Observations, alpha: float) -> tuple[DomainTest, AcceptedEffect | None]:

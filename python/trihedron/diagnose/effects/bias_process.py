@@ -1,7 +1,7 @@
 """Bias that drifts in time, or differs from pose to pose, and that no logged channel explains."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -70,10 +70,10 @@ class BiasDrift(BiasProcess):
 
     def variants(self, context: Context) -> list[Variant]:
         """Line, warm-up exponentials, a slow curve of some cosines per axis, and steps (after a shock)."""
-        out = [self._along(context, lambda x: x[:, None], ("drift",), "line")]
+        out = [self._along(context, context.elapsed[:, None], ("drift",), "line")]
         out += [self._warm_up(context, fraction * _duration_s(context)) for fraction in WARM_UP_FRACTIONS]
-        symbols = [f"cosine{k}" for k in COSINES]
-        out.append(self._along(context, lambda x: np.cos(np.pi * np.outer(x, COSINES)), symbols, "curve"))
+        cosines = np.cos(np.pi * np.outer(context.elapsed, COSINES))
+        out.append(self._along(context, cosines, [f"cosine{k}" for k in COSINES], "curve"))
         return out + self._steps(context)
 
     def _warm_up(self, context: Context, tau_s: float) -> Variant:
@@ -81,8 +81,8 @@ class BiasDrift(BiasProcess):
         of a warm sensor."""
         lasts_s = _duration_s(context)
         tau_s = max(tau_s, WARM_UP_FRACTIONS[0] * lasts_s)
-        shape = {"time_constant": (tau_s, "s")}
-        return self._along(context, lambda x: np.exp(-x[:, None] * lasts_s / tau_s), ("warm_up",), "warm-up", shape)
+        decay = np.exp(-context.elapsed[:, None] * lasts_s / tau_s)
+        return self._along(context, decay, ("warm_up",), "warm-up", {"time_constant": (tau_s, "s")})
 
     def _steps(self, context: Context) -> list[Variant]:
         """Steps at the likeliest places between poses, chosen by the poses alone among all."""
@@ -90,20 +90,19 @@ class BiasDrift(BiasProcess):
         out = []
         for k in np.argsort(_left_by_steps(context, self.shows_as))[:N_STEPS]:
             at_s = float(0.5 * (times[k] + times[k + 1]))
-            made = self._along(context, _after(context, at_s), (STEP,), STEP, {STEP_TIME: (at_s, "s")})
+            after = (context.time_s[:, None] > at_s).astype(np.float64)
+            made = self._along(context, after, (STEP,), STEP, {STEP_TIME: (at_s, "s")})
             sigma = float(times[k + 1] - times[k]) * np.sqrt(UNIFORM)
             out.append(replace(made, shape_sigma=sigma, n_places=max((h - 1) / N_STEPS, 1.0)))
         return out
 
     def _along(
-        self, context: Context, curves: Callable[[FloatArray], FloatArray], symbols: Sequence[str], label: str,
+        self, context: Context, curves: FloatArray, symbols: Sequence[str], label: str,
         shape: dict[str, tuple[float, str]] | None = None,
     ) -> Variant:  # fmt: skip
-        """``curves`` (n, k) of the elapsed share of the session (n,), zero on average over the poses, as the session's
-        bias is."""
-        poses = context.obs.segments
-        x = (poses.time_mid_s - context.obs.time_s[0]) / _duration_s(context)
-        centred = curves(context.elapsed) - np.average(curves(x), axis=0, weights=poses.duration_s)
+        """``curves`` (points, k) over time, zero on average over the poses, as the session's bias is."""
+        weights = context.obs.segments.duration_s
+        centred = curves - np.average(curves[: len(weights)], axis=0, weights=weights)
         parts = ((symbol, values[:, None], self.unit) for symbol, values in zip(symbols, centred.T, strict=True))
         return on_axes(context, self.sensor, *parts, label=label, shape=shape)
 
@@ -179,12 +178,6 @@ def _left_by_steps(context: Context, sensor: int) -> FloatArray:
         columns = np.hstack([known, np.where(later, seen, 0.0)])
         out[k] = ((error - columns @ np.linalg.lstsq(columns, error)[0]) ** 2).sum()
     return out
-
-
-def _after(context: Context, at_s: float) -> Callable[[FloatArray], FloatArray]:
-    """A step at a time, as a curve (n, 1) of the elapsed share of the session (n,)."""
-    share = (at_s - float(context.obs.time_s[0])) / _duration_s(context)
-    return lambda x: (x > share)[:, None].astype(np.float64)
 
 
 def _duration_s(context: Context) -> float:

@@ -6,7 +6,7 @@ To add one: write a file in this folder with a subclass of :class:`Effect` and n
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,16 +22,21 @@ from trihedron.session.drift import TYPICAL
 
 
 class Side(NamedTuple):
-    """How one sensor is called in variants, in names of parameters, and the SI unit of its readings."""
+    """How one sensor is called in variants, in names of parameters and in records, the SI unit of its readings, and the
+    domain of its static residuals."""
 
     label: str
     prefix: str
+    name: Literal["accelerometer", "gyroscope"]
     unit: str
+    domain: Domain
 
 
 ACCELEROMETER, GYRO = 0, 1
-SENSORS = (Side("accelerometer", "accel", "m/s^2"), Side("gyro", "gyro", "rad/s"))
-NOWHERE = Where()
+SENSORS = (
+    Side("accelerometer", "accel", "accelerometer", "m/s^2", "static-accel"),
+    Side("gyro", "gyro", "gyroscope", "rad/s", "static-gyro"),
+)
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
 MOST_NAMED = 4
@@ -183,7 +188,7 @@ class Evidence:
     parameters: tuple[EffectParameter, ...]
     statement: str
     domain: Domain
-    where: Where = NOWHERE
+    where: Where = field(default_factory=Where)
     held_out: tuple[HeldOut, ...] = ()
     reweigh: Callable[[Observations], Observations] | None = None
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None

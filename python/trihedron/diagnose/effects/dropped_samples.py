@@ -88,10 +88,8 @@ def with_gaps(obs: Observations, losses: list[Loss]) -> Observations:
     extra[[loss.sample + 1 for loss in losses]] = [loss.count for loss in losses]
     time_s = obs.time_s + np.cumsum(extra) / obs.recording.rate_hz
     middle = np.array([0.5 * (time_s[pose.start] + time_s[pose.stop - 1]) for pose in obs.segments.poses])
-    return replace(
-        obs, time_s=time_s, pose_time_s=middle, segments=replace(obs.segments, time_mid_s=middle),
-        recording=obs.recording.with_same_readings(time_s=time_s),
-    )  # fmt: skip
+    recording = obs.recording.with_same_readings(time_s=time_s)
+    return replace(obs, time_s=time_s, pose_time_s=middle, recording=recording)
 
 
 class DroppedSamples(DirectEffect):

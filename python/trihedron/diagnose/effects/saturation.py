@@ -50,10 +50,10 @@ class Plateau:
 
 
 @lru_cache(maxsize=16)
-def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
+def plateaus_of(obs: Observations, sensor: int) -> list[Plateau]:
     """Runs at the limits of one sensor inside the moves of ``obs``."""
-    name = "gyroscope" if is_gyro else "accelerometer"
-    if (obs.raw_rate if is_gyro else obs.raw_force) is None or not obs.move_ranges:
+    name = SENSORS[sensor].name
+    if (obs.raw_force, obs.raw_rate)[sensor] is None or not obs.move_ranges:
         return []
     exact, noisy = obs.recording.facts.of(name).limits, obs.recording.possible_limits[name]
     starts, stops = np.array(obs.move_ranges, dtype=np.int64).T
@@ -70,8 +70,8 @@ def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
 def clipped_samples(obs: Observations) -> BoolArray:
     """(n,) samples within ``HALF_WINDOW`` of a plateau at a range limit: their steps give no time error."""
     mask = np.zeros(len(obs.time_s), dtype=bool)
-    for is_gyro in (False, True):
-        for run in plateaus_of(obs, is_gyro=is_gyro):
+    for sensor in (ACCELEROMETER, GYRO):
+        for run in plateaus_of(obs, sensor):
             mask[max(run.start - HALF_WINDOW, 0) : run.stop + HALF_WINDOW] = True
     return mask
 
@@ -82,7 +82,7 @@ class _Saturation(DirectEffect):
     def find(self, context: Context) -> Evidence | None:
         obs, is_gyro = context.obs, self.sensor == GYRO
         raw, density = (obs.raw_rate, obs.rate_density) if is_gyro else (obs.raw_force, obs.force_density)
-        runs = plateaus_of(obs, is_gyro=is_gyro)
+        runs = plateaus_of(obs, self.sensor)
         if raw is None or density is None or not runs:
             return None
         sigma = density * np.sqrt(obs.recording.rate_hz)

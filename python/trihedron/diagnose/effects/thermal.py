@@ -129,7 +129,7 @@ class SupplySensitivity(Effect):
         out = [
             on_axes(context, sensor, (f"{prefix}_scale", v * context.axis_motion(sensor), "1"),
                     (f"{prefix}_offset", v, unit), label=label)
-            for sensor, (label, prefix, unit) in enumerate(SENSORS)
+            for sensor, (label, prefix, _, unit, _) in enumerate(SENSORS)
             if sensor == ACCELEROMETER or context.obs.raw_rate is not None
         ]  # fmt: skip
         if len(out) == 1:

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, acting_on
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on
 from trihedron.records.domains import Domain
 
 ALL_AXES = (0, 1, 2)
@@ -28,14 +28,14 @@ class Dependence(Effect):
     ) -> None:  # fmt: skip
         self.sensor, self.family, self.is_motion, self.parts, self.courses = sensor, family, is_motion, parts, courses
         self.names = tuple(name for course in courses for name, *_ in course)
-        self.id = f"{('accelerometer', 'gyroscope')[sensor]} {family}: {', '.join(self.names)}"
+        self.id = f"{SENSORS[sensor].name} {family}: {', '.join(self.names)}"
 
     @property
     def domain(self) -> Domain:
         """The domain of residuals in which it shows."""
         if self.is_motion:
             return "moves" if self.sensor else "dynamics"
-        return "static-gyro" if self.sensor else "static-accel"
+        return SENSORS[self.sensor].domain
 
     def base(self, context: Context) -> tuple[FloatArray, Sequence[str]]:
         """Columns (points or 1, 3, m) that are multiplied by the variables, and their names: one along each axis."""

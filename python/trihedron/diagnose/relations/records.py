@@ -57,7 +57,7 @@ def _relation(
     """A relation with what the catalogue says of its family; ``said`` are its form and its statement."""
     form, statement = said
     return Relation(
-        "gyroscope" if sensor else "accelerometer", depends_on, form, coefficients, share, None,
+        SENSORS[sensor].name, depends_on, form, coefficients, share, None,
         relation_resembles(family), relation_experiment(family), statement,
     )  # fmt: skip
 

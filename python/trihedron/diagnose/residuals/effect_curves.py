@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import GYRO, SENSORS
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import EffectCurve
 from trihedron.records.domains import DomainResiduals
@@ -75,7 +76,6 @@ LEAST_TOLD = 0.98
 variables leaves tenths."""
 LEAST_PART = 0.4
 """Component of gravity along an axis, relative to g, below which a pose does not determine that axis."""
-SIDES = (("accelerometer", "static-accel"), ("gyroscope", "static-gyro"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,15 +143,14 @@ def effect_curves(
     """
     known = drivers(context)
     out = []
-    for (sensor, domain), side in zip(SIDES, columns, strict=True):
+    for sensor, side in enumerate(columns):
         if side is None:
             continue
         found = [one for k in range(side.shape[2]) if (one := _driven(context, known, side[:, :, k], k)) is not None]
         for key in dict.fromkeys(one.key for one in found):
             group = [one for one in found if one.key == key]
             at = [one.parameter for one in group]
-            left = next((one for one in residuals if one.domain == domain), None)
-            out.append(_curve(context, sensor, group, (value[at], covariance[np.ix_(at, at)]), left))
+            out.append(_curve(context, sensor, group, (value[at], covariance[np.ix_(at, at)]), residuals))
     return tuple(out)
 
 
@@ -159,15 +158,13 @@ def bias_curves(
     context: Context, sensor: int, path: FloatArray, std: FloatArray, residuals: Sequence[DomainResiduals]
 ) -> tuple[EffectCurve, ...]:
     """A bias random walk as curves over time: ``path`` (poses, 3) with standard uncertainties (3,), SI."""
-    name, domain = SIDES[sensor]
     h, time = context.obs.n_poses, Driver("time", 0, context.time_s)
-    left = next((one for one in residuals if one.domain == domain), None)
     out = []
     for axis in range(3):
-        poses, data = _of_poses(context, name, _Column(axis, time.values, np.eye(3)[axis], time), left)
+        poses, data = _of_poses(context, sensor, _Column(axis, time.values, np.eye(3)[axis], time), residuals)
         at = tuple(poses.tolist()), time.values[poses], data + path[poses, axis]
         curve = time.values[:h], path[:, axis], np.full(h, std[axis])
-        out.append(EffectCurve(name, axis, "time", 0, False, *curve, *at))  # type: ignore[arg-type]
+        out.append(EffectCurve(SENSORS[sensor].name, axis, "time", 0, False, *curve, *at))
     return tuple(out)
 
 
@@ -202,12 +199,9 @@ def _is_determined(driver: Driver, g: FloatArray) -> bool:
 
 
 def _curve(
-    context: Context,
-    sensor: str,
-    group: Sequence[_Column],
-    fitted: tuple[FloatArray, FloatArray],
-    left: DomainResiduals | None,
-) -> EffectCurve:
+    context: Context, sensor: int, group: Sequence[_Column], fitted: tuple[FloatArray, FloatArray],
+    residuals: Sequence[DomainResiduals],
+) -> EffectCurve:  # fmt: skip
     value, covariance = fitted
     first, (axis, name, driver_axis, is_relative) = group[0], group[0].key
     # Over the range of the poses; over the whole one of a variable that is constant in poses.
@@ -215,31 +209,29 @@ def _curve(
     ends = variable[:h] if np.ptp(variable[:h]) > 1e-6 * np.ptp(variable) else variable
     x = np.linspace(float(ends.min()), float(ends.max()), N_SHOWN)
     table = np.stack([one.at(x) for one in group], axis=1)
-    poses, data = _of_poses(context, sensor, first, left)
+    poses, data = _of_poses(context, sensor, first, residuals)
     posed = np.stack([one.g[:h] for one in group], axis=1)
     if name not in ("force", "rate"):
         # The level is absorbed by bias or scale: the curve is relative to its mean.
         level = np.nanmean(posed, axis=0) if np.isfinite(posed).any(axis=0).all() else table.mean(axis=0)
         table, posed = table - level, posed - level
-    return EffectCurve(
-        sensor=sensor,  # type: ignore[arg-type]
-        axis=axis, driver=name, driver_axis=driver_axis, is_relative=is_relative, x=x,
-        value=table @ value,
-        sigma=np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", table, covariance, table), 0.0)),
-        poses=tuple(int(k) for k in poses),
-        data_x=variable[poses],
-        data=data + posed[poses] @ value,
-    )  # fmt: skip
+    sigma = np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", table, covariance, table), 0.0))
+    at = tuple(poses.tolist()), variable[poses], data + posed[poses] @ value
+    driver = name, driver_axis, is_relative
+    return EffectCurve(SENSORS[sensor].name, axis, *driver, x, table @ value, sigma, *at)
 
 
-def _of_poses(context: Context, sensor: str, one: _Column, left: DomainResiduals | None) -> tuple[IntArray, FloatArray]:
+def _of_poses(
+    context: Context, sensor: int, one: _Column, residuals: Sequence[DomainResiduals]
+) -> tuple[IntArray, FloatArray]:
     """Poses that determine an axis (n,), and the residual of each along it (n,)."""
     h = context.obs.n_poses
-    nothing = np.zeros(0, dtype=np.intp), np.zeros(0)
-    if left is None or len(left.after) != h or (one.driver.name == "rate"):
-        return nothing
-    if sensor == "gyroscope":
-        return nothing if one.is_relative else (np.arange(h), left.after @ one.direction)
+    left = next((domain for domain in residuals if domain.domain == SENSORS[sensor].domain), None)
+    # In poses no gyro reads a rate.
+    if left is None or len(left.after) != h or one.driver.name == "rate" or (sensor == GYRO and one.is_relative):
+        return np.zeros(0, dtype=np.intp), np.zeros(0)
+    if sensor == GYRO:
+        return np.arange(h), left.after @ one.direction
     # The norm determines only the component along gravity.
     up = directions_of(context.force[:h])
     part = up @ one.direction
