@@ -51,27 +51,25 @@ def diagnose_static_log(
     only for sizes in physical units.
     """
     sides: list[_Side] = []
-    within: list[tuple[DomainTest, AcceptedEffect | None]] = []
+    within, calm = list[DomainTest](), list[DomainTest]()
+    effects = list[AcceptedEffect]()
     tried = {effect.id: Candidate(effect.id, None, False, why_not("few-orientations")) for effect in catalogue()}
     if pieces is not None:
         obs = observe(recording, pieces[0])
         n_sensors = 1 if obs.pose_rate is None else 2
         sides = [_judged(obs, pieces[1], model, gravity_m_s2, k, alpha) for k in range(n_sensors)]
-        within = [_lines(sides[-1].plain, obs, alpha)]
-        of_lines = Candidate("periodic-interference", within[0][0].p_value, True)
+        test, lines = _lines(sides[-1].plain, obs, alpha)
+        effects = [*(effect for side in sides for effect in side.effects), *lines]
+        within, calm = [test], [replace(test, disagrees=False, where=Where()) if lines else test]
+        of_lines = Candidate("periodic-interference", test.p_value, True)
         tried |= {one.id: one for one in (*(c for side in sides for c in side.candidates), of_lines)}
-    effects = [
-        *(effect for side in sides for effect in side.effects),
-        *(line for _, line in within if line is not None),
-    ]
     densities = [side.plain.context.noise_density[GYRO].tolist() for side in sides] or [[0.0] * 3]
     noise: dict[str, Any] = {}
     for (_, _, name, unit, _), density in zip_longest(SENSORS, densities):
         noise |= {f"{name}_density": density, f"{name}_unit": f"{unit}/sqrt(Hz)", f"{name}_corner_s": None}
-    calm = [test if line is None else replace(test, disagrees=False, where=Where()) for test, line in within]
     return Diagnosis(
         verdict="missing-physics" if effects else "not-testable",
-        domains=(*(side.before for side in reversed(sides)), *(test for test, _ in within)),
+        domains=(*(side.before for side in reversed(sides)), *within),
         effects=tuple(sorted(effects, key=lambda effect: -(effect.share or 0.0))),
         remaining=(*(side.after for side in reversed(sides)), *calm),
         candidates=tuple(tried[key] for key in sorted(tried)),
@@ -247,11 +245,11 @@ def _domain(sensor: int, x: FloatArray, shown: DomainResiduals, unit: str, *, is
     return DomainTest(SENSORS[sensor].domain, chi2, float(x.size), p, disagrees, where, rms, unit)
 
 
-def _lines(plain: Hypothesis, obs: Observations, alpha: float) -> tuple[DomainTest, AcceptedEffect | None]:
+def _lines(plain: Hypothesis, obs: Observations, alpha: float) -> tuple[DomainTest, list[AcceptedEffect]]:
     """Spectral lines of the pieces, and the test of noise that differs between pieces."""
     test, effect = judge_within_poses(obs, alpha), PeriodicInterference()
     found = effect.find(plain.context if obs.raw_rate is None else Context(replace(plain.fitted, obs=obs)))
     if found is None or found.p_value * len(catalogue()) >= alpha / 2.0:
-        return test, None
+        return test, []
     record = effect_record(effect, found.parameters, found.statement, found.p_value, found.strength, found.held_out)
-    return test, replace(record, share=found.share)
+    return test, [replace(record, share=found.share)]

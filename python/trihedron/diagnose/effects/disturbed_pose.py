@@ -5,14 +5,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import (
-    MOST_NAMED,
-    DirectEffect,
-    Evidence,
-    Variant,
-    acting_on,
-    per_axis,
-)
+from trihedron.diagnose.effects.contract import MOST_NAMED, DirectEffect, Evidence, Variant, acting_on, per_axis
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF
 from trihedron.diagnose.residuals.within_poses import loud_poses, pose_scatter
 from trihedron.diagnose.session.observations import LOUD, Observations
@@ -24,14 +17,13 @@ from trihedron.session.model import STATIC_ACCEL
 
 BUMP_SIGMA = 7.0
 """Deviation of a 0.1 s mean from the line through its surroundings, in sigma: drift inside a pose stays below it."""
-OUTLYING = 9.0 / (4.0 + chdtri(5, RARE_ALARM))
-"""Weight of a move below which its five residuals are in the tails (eq. 11.18a)."""
 
 
 def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
     """Deviation of the readings in ``span`` [s] from the straight line through the readings before and after it.
 
-    Chi-square per 0.1 s block and channel inside and outside the span; ``None`` below 7 sigma or with too few blocks.
+    Chi-square per 0.1 s block and channel inside and outside the span; ``None`` below 7 sigma, where it is no larger
+    inside, or with too few blocks.
     """
     rate = obs.recording.rate_hz
     a, b = (int(k) for k in np.searchsorted(obs.time_s, span))
@@ -44,18 +36,15 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
         return None
     k = np.arange(n)
     outer = (k < edge) | (k >= n - edge)
-    inside, outside = [], []
-    for values in obs.whitened:
-        means = values[first : first + n * block].reshape(n, block, 3).mean(axis=1)
-        line = np.polynomial.polynomial.polyfit(k[outer], means[outer], 1)
-        away = (means - (line[0] + np.outer(k, line[1]))) * np.sqrt(block)
-        inside.append(away)
-        outside.append(away[outer])
-    worst = np.sort(np.abs(np.hstack(inside)).max(axis=1))[::-1]
-    if worst[0] <= BUMP_SIGMA:
+    readings = np.hstack([values[first : first + n * block] for values in obs.whitened])
+    means = readings.reshape(n, block, -1).mean(axis=1)
+    line = np.polynomial.polynomial.polyfit(k[outer], means[outer], 1)
+    away = (means - (line[0] + np.outer(k, line[1]))) * np.sqrt(block)
+    middle = away if outer.all() else away[~outer]
+    before, after = float(np.mean(middle**2)), float(np.mean(away[outer] ** 2))
+    # Neither holds of missing readings.
+    if not (np.abs(away).max() > BUMP_SIGMA and before > after):
         return None
-    middle = np.hstack(inside)[~outer] if (~outer).any() else np.hstack(inside)
-    before, after = float(np.mean(middle**2)), float(np.mean(np.hstack(outside) ** 2))
     return HeldOut("within-static", before, after, float(np.sqrt(before)), float(np.sqrt(after)), "sigma")
 
 
@@ -93,7 +82,8 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
         if raw is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
             out |= (np.abs(_core.half_changes(raw, obs.segments.spans)) > 2.0 * SURE * sigma).any(axis=1)
-    before, after = obs.move_poses[fitted.core.tails < OUTLYING].T
+    # Weight of a move below which its five residuals are in the tails (eq. 11.18a).
+    before, after = obs.move_poses[fitted.core.tails < 9.0 / (4.0 + chdtri(5, RARE_ALARM))].T
     out[np.intersect1d(before, after)] = True
     return out
 
@@ -110,8 +100,7 @@ class DisturbedPose(DirectEffect):
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
         found = obs.times((a, min(b + 1, len(obs.time_s))) for pose in obs.whole.poses for a, b in pose.disturbed)
-        seen = [(span, bump) for span in found if (bump := _bump(obs, span)) is not None]
-        bumps = {span: bump for span, bump in seen if bump.chi2_per_dof_after < bump.chi2_per_dof_before}
+        bumps = {span: bump for span in found if (bump := _bump(obs, span)) is not None}
         disturbed = list(bumps)
         held = (max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before),) if disturbed else ()
         restless, predicted = _restless(obs)

@@ -11,7 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, acting_on
 from trihedron.diagnose.session.starting_point import PUBLISHED_DIGITS
 from trihedron.gravity import EARTH_RATE_RAD_S
-from trihedron.probability import chdtri
+from trihedron.probability import chdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 from trihedron.units import degrees_from_radians
@@ -22,8 +22,6 @@ CLOSER = 6.0
 """Steps of the grid to either side of the best that the next grid covers, where an angle is surer than a step."""
 STATED = "stated_vertical"
 """Parameter of a log without Earth rate: the vertical component that the session model subtracts."""
-MISSES = chdtri(1, FALSE_ALARM)
-"""χ² of the vector's length above which it is not Earth rate."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +101,12 @@ class EarthRate(Effect):
         ]
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
-        if STATED in variant.shape:
-            return float((value[0] + variant.shape[STATED][0]) ** 2 / covariance[0, 0]) < MISSES
         # The length of Earth rate is known: any other vector is another effect.
-        return _nearest(variant, value, covariance).chi2 < MISSES
+        if STATED in variant.shape:
+            chi2 = float((value[0] + variant.shape[STATED][0]) ** 2 / covariance[0, 0])
+        else:
+            chi2 = _nearest(variant, value, covariance).chi2
+        return chdtrc(1, chi2) > FALSE_ALARM
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         own = super().parameters(variant, value, covariance)

@@ -1,6 +1,7 @@
 """Resolution too coarse for the noise: pose means follow the staircase of the ADC; and codes that never occur."""
 
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from scipy.special import pdtrc
@@ -119,12 +120,6 @@ class Quantisation(DirectEffect):
         found = [one for c in range(3 if obs.raw_rate is None else 6) if (one := self._channel(obs, c)) is not None]
         if not found:
             return None
-
-        def reweigh(old: Observations) -> Observations:
-            for one in found:
-                old = _resolved(old, one)
-            return old
-
         worst = max(found, key=lambda one: one.step / one.sigma)
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_poses)
         names = tuple(CHANNELS[one.channel] for one in found)
@@ -140,7 +135,7 @@ class Quantisation(DirectEffect):
             )  # fmt: skip
         return Evidence(
             0.0, strength, _parameters(context, found), statement, "within-static", Where(names),
-            reweigh=reweigh, share=worst.added / (worst.added + worst.sigma**2),
+            reweigh=lambda old: reduce(_resolved, found, old), share=worst.added / (worst.added + worst.sigma**2),
             restate=lambda later: _parameters(later, found),  # the staircase had biased the scale factors
         )  # fmt: skip
 

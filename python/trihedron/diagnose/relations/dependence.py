@@ -9,7 +9,6 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, acting_on
 from trihedron.records.domains import Domain
 
-ALL_AXES = (0, 1, 2)
 Column = tuple[str, FloatArray, str]
 """Name, values (points,) and unit of one variable."""
 
@@ -24,7 +23,7 @@ class Dependence(Effect):
 
     def __init__(
         self, sensor: int, family: str, *courses: Sequence[Column], is_motion: bool = False,
-        parts: Sequence[tuple[int, ...]] = ((0,), (1,), (2,), ALL_AXES),
+        parts: Sequence[tuple[int, ...]] = ((0,), (1,), (2,), (0, 1, 2)),
     ) -> None:  # fmt: skip
         self.sensor, self.family, self.is_motion, self.parts, self.courses = sensor, family, is_motion, parts, courses
         self.names = tuple(name for course in courses for name, *_ in course)

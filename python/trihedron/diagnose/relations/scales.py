@@ -7,7 +7,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.bias_process import COSINES, N_STEPS
-from trihedron.diagnose.relations.dependence import ALL_AXES, Column, Dependence
+from trihedron.diagnose.relations.dependence import Column, Dependence
 
 
 class ScaleInTime(Dependence):
@@ -15,7 +15,7 @@ class ScaleInTime(Dependence):
     a triad that turns in the case, which gravity does not show of an accelerometer."""
 
     def __init__(self, sensor: int, *courses: Sequence[Column]) -> None:
-        parts = [(0,), (1,), (2,), ALL_AXES, (3,), *([(4, 5, 6)] if sensor else [])]
+        parts = [(0,), (1,), (2,), (0, 1, 2), (3,), *([(4, 5, 6)] if sensor else [])]
         super().__init__(sensor, "scale", *courses, is_motion=bool(sensor), parts=parts)
 
     def base(self, context: Context) -> tuple[FloatArray, Sequence[str]]:

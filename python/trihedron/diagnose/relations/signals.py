@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.relations.dependence import ALL_AXES, Column, Dependence
+from trihedron.diagnose.relations.dependence import Column, Dependence
 from trihedron.diagnose.relations.rotations import HISTORY, decaying, retained
 from trihedron.diagnose.relations.scales import scales_in_time
 
@@ -31,7 +31,7 @@ class WorldVector(Dependence):
     would be a g-sensitivity. Columns along the axes of the level frame for each axis of the body, vertical last."""
 
     def __init__(self, columns: Sequence[Column], dips_deg: tuple[float, ...]) -> None:
-        super().__init__(1, "world", columns, parts=(ALL_AXES,))
+        super().__init__(1, "world", columns, parts=((0, 1, 2),))
         self.dips_deg, self.id = dips_deg, f"{self.id}, dip {dips_deg}"
 
     def variants(self, context: Context) -> list[Variant]:
@@ -83,7 +83,7 @@ def _each(sensor: int, family: str, columns: Sequence[Column], *, is_motion: boo
     three = range(0, len(columns) - 2, 3) if family in ANY_BY_ANY else ()
     out = [Dependence(sensor, family, [one], is_motion=is_motion) for one in columns]
     vectors = [columns[k : k + 3] for k in three]
-    return out + [Dependence(sensor, family, one, is_motion=is_motion, parts=(ALL_AXES,)) for one in vectors]
+    return out + [Dependence(sensor, family, one, is_motion=is_motion, parts=((0, 1, 2),)) for one in vectors]
 
 
 def _products(symbol: str, values: FloatArray, unit: str) -> list[Column]:

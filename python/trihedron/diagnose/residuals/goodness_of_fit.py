@@ -21,8 +21,6 @@ N_DOMAINS_TESTED = float(len(DOMAINS))
 LEAST_DOF = 0.5
 """Degrees of freedom below which the fit has used up a domain."""
 
-_CHANNELS = {domain: CHANNELS[3:] if domain in (STATIC_GYRO, MOVES) else CHANNELS[:3] for domain in ROW_DOMAINS}
-
 
 def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
     """Chi-square of every row domain against its degrees of freedom (eq. 8.7).
@@ -58,7 +56,7 @@ def locate(fitted: Fit, label: int) -> Where:
     per_segment = {int(s): float(squared[segments == s].sum()) for s in np.unique(segments)}
     heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > CLEAR**2][:5]
     per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
-    names = _CHANNELS[label]
+    names = CHANNELS[3:] if label in (STATIC_GYRO, MOVES) else CHANNELS[:3]
     channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] >= per_channel.mean())
     if label in (STATIC_ACCEL, STATIC_GYRO):
         return Where(channels, obs.pose_names(heavy), obs.times(obs.segments.spans[heavy]))
