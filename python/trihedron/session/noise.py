@@ -96,17 +96,17 @@ def measure_noise(
         raise InputError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), TINY)
-    sigmas = [np.maximum(segments.accelerometer_sigma_mean, floor)]
-    densities = [np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s)]
-    spans = segments.spans
-    of_rate = 0.0
+    force_sigma = np.maximum(segments.accelerometer_sigma_mean, floor)
+    force_density = np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s)
+    spans, rate_sigma, rate_density, of_rate = segments.spans, None, None, 0.0
     if recording.gyroscope is not None and segments.gyroscope_sigma is not None:
-        sigmas.append(np.maximum(np.asarray(segments.gyroscope_sigma_mean), TINY))
-        densities.append(np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s))
+        rate_sigma = np.maximum(np.asarray(segments.gyroscope_sigma_mean), TINY)
+        rate_density = np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s)
         of_rate = _core.flicker_scatter(recording.gyroscope, spans, None, FEWEST_POSES)
     moves_last = [float(recording.time_s[b - 1] - recording.time_s[a]) for a, b in ranges]
     variances = np.zeros((len(ranges), 4, 3))
-    for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
+    of_force = recording.accelerometer, force_sigma, force_density
+    for k, (readings, sigma, density) in enumerate((of_force, (recording.gyroscope, rate_sigma, rate_density))):
         if readings is None or not ranges:
             continue
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
@@ -115,16 +115,14 @@ def measure_noise(
         if k == 0:
             # For a gyro rounding is estimated with the angles of moves and the place of its bias.
             variances[:, 2] += rounding_of_moves(readings, ranges, quantum, segments.accelerometer_sigma) * step_s**2
-        if k < len(sigmas):
-            poses = spans, sigmas[k]
-            variances[:, 2 + k] += _core.coloured_variance(readings, poses, densities[k], step_s, moves_last)
+        if sigma is not None and density is not None:
+            variances[:, 2 + k] += _core.coloured_variance(readings, (spans, sigma), density, step_s, moves_last)
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
     scatter = 0.0 if along is None else _core.flicker_scatter(recording.accelerometer, spans, up, FEWEST_POSES)
-    rate_sigma, rate_density = (sigmas[1], densities[1]) if len(sigmas) > 1 else (None, None)
     noise = SessionNoise(
-        pose_force_sigma=sigmas[0], force_density=densities[0], pose_rate_sigma=rate_sigma, rate_density=rate_density,
-        force_up=along, force_scatter=scatter, rate_scatter=of_rate,
+        pose_force_sigma=force_sigma, force_density=force_density, force_up=along, force_scatter=scatter,
+        pose_rate_sigma=rate_sigma, rate_density=rate_density, rate_scatter=of_rate,
     )  # fmt: skip
     return noise, variances
 

@@ -17,9 +17,8 @@ from trihedron.records.words import Words
 from trihedron.units import degrees_from_radians
 
 N_GRID = 121
-"""Latitudes and azimuths at which the likelihood is computed: 1.5° and 3°, then closer about the best."""
-CLOSER = 6.0
-"""Steps of the grid to either side of the best that the next grid covers, where an angle is surer than a step."""
+"""Latitudes and azimuths at which the likelihood is computed: 1.5° and 3°, then closer about the best,
+until no angle is surer than a step."""
 STATED = "stated_vertical"
 """Parameter of a log without Earth rate: the vertical component that the session model subtracts."""
 
@@ -59,7 +58,7 @@ def nearest_turning(value: FloatArray, covariance: FloatArray) -> Turning:
             return Turning(*mean, float(std[0]), float(std[1]), float(chi2.min()))
         best = np.unravel_index(int(weight.argmax()), weight.shape)
         centre = np.where(std > step, centre, [latitude[best], azimuth[best]])
-        half = np.where(std > step, half, CLOSER * step)
+        half = np.where(std > step, half, 0.5 * half)
 
 
 def _turning(latitude: FloatArray, azimuth: FloatArray) -> FloatArray:

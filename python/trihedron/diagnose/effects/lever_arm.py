@@ -42,14 +42,12 @@ class LeverArm(DirectEffect):
         if found is None:
             return None
         arm, covariance, p_value, (before, after), n_moves = found
-        share = 1.0 - after / before
         if p_value > P_LIMIT:
             return None
         noise = context.obs.recording.rate_hz * float((context.noise_density[0] ** 2).mean())
-        rms = math.sqrt(before), math.sqrt(after)
-        held = HeldOut("dynamics", before / noise, after / noise, *rms, "m/s^2")
+        held = HeldOut("dynamics", before / noise, after / noise, math.sqrt(before), math.sqrt(after), "m/s^2")
         parameters = per_axis_parameters("r", arm, np.sqrt(np.diag(covariance)), "m")
-        statement = self.reported("arm", arm_m=float(np.linalg.norm(arm)), share=share)
+        statement = self.reported("arm", arm_m=float(np.linalg.norm(arm)), share=1.0 - after / before)
         strength = n_moves * math.log(before / after)
         return Evidence(p_value, strength, parameters, statement, "dynamics", Where(("ax", "ay", "az")), (held,))
 
