@@ -168,8 +168,9 @@ def fitted_near(model: Hypothesis, tried: Sequence[Tried], k: int) -> list[Hypot
     fewer = model.without[k] if near and k < len(terms) else model
 
     def fitted(one: Tried) -> Hypothesis:
-        term = as_fits_best(fewer, one)
-        return again(model, [*terms[:k], term, *terms[k + 1 :]], strengths=one.asked.strengths)
+        # Noise strengths of a rival begin where those of the term begin: the search along them ends near its start.
+        strengths = one.asked.strengths if k == len(terms) else None
+        return again(model, [*terms[:k], as_fits_best(fewer, one), *terms[k + 1 :]], strengths=strengths)
 
     made = side_by_side(fitted, near)
     return [one for one in made if one.terms[k].effect.is_plausible(one.terms[k].variant, *one.value(k))]
