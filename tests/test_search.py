@@ -127,6 +127,7 @@ def test_a_relation_beside_the_place_and_the_motion_alone_is_unexplained(named, 
     assert Answer.says_why.fget(answer) is is_explained
 
 
+@pytest.mark.slow
 def test_a_long_delay_is_a_delay_of_that_length():
     d = diagnosed("accel-gyro-time-offset", 4, 14, offset_s=0.04)
     first = d.effects[0]
@@ -141,6 +142,7 @@ def test_a_long_delay_is_a_delay_of_that_length():
         assert effect.share is None or 0.0 <= effect.share <= 1.0
 
 
+@pytest.mark.slow
 def test_a_strong_quadratic_of_a_gyro_is_no_cubic_as_well():
     """Columns of the readings, which contain the effect, gave a cubic of 8 σ beside it."""
     effects = diagnosed("gyro-scale-nonlinearity", 3, 16, c2=[0.0, 0.02, 0.0]).effects
