@@ -18,7 +18,6 @@ from trihedron.report.findings.wording import opening
 from trihedron.report.names import id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, listed, plain_number
 
-COLUMNS = 3
 LONGEST = 16
 """Most letters of a name beside its row; recordings with longer names are numbered, as in the title."""
 

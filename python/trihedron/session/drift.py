@@ -12,8 +12,8 @@ PER_KELVIN = (5e-3, 4e-4)
 PER_FORCE = 2e-4
 """G-sensitivity of typical gyros, one sigma [(rad/s)/(m/s²)]: 0.1 °/s/g."""
 SLOW_S = (2.0, 6.0, 20.0, 60.0)
-"""Time constants tried, s, of what follows a rotation or a temperature late, then refined: faster decays are over
-before a pose is static, slower ones last for ten poses."""
+"""Time constants tried, s, of what follows a temperature or a force late, then refined: faster decays are over before a
+pose is static, slower ones last for ten poses."""
 LEAST_SWING_K = 0.2
 """A logged temperature that changes by less is not used: the resolution of on-chip thermometers is 0.002 to 0.1 °C."""
 SAME_POSE_RAD, LEAST_SHARE = 0.12, 0.04
