@@ -158,7 +158,7 @@ def test_logs_of_two_units_in_one_folder_are_not_one_device(tmp_path):
     result = summarise(rows, tmp_path)
     (mixed,) = result.summary.mixed
     assert (mixed.serial, mixed.n_logs, mixed.parameter.id) == ("logs", 4, "gyro-scale")
-    assert not fleet_report(result.summary).is_trustworthy
+    assert fleet_report(result.summary).level == "bad"
     assert summarise(rows[4:], tmp_path).summary.mixed == ()
 
 

@@ -43,9 +43,9 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 def _version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version as installed
+        from trihedron.files.calibration import written_by
 
-        typer.echo(f"trihedron {installed('trihedron')}")
+        typer.echo(written_by())
         raise typer.Exit
 
 

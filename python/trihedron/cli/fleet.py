@@ -68,5 +68,5 @@ def fleet(
     write_report(document, lambda: {}, out / "fleet.html", force=True)
     say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}")
     say(f"calibrations, for export, verify and apply: {out / 'calibrations'}")
-    if not document.is_trustworthy:
+    if document.level == "bad":
         raise typer.Exit(NOT_TO_BE_TRUSTED)

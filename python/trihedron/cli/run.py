@@ -155,9 +155,9 @@ def with_provenance(document: Document) -> Document:
     rows = [("command", shlex.join(["trihedron", *run.typed]))] if run.typed else []
     rows.append(("date", datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")))
     # Imported here: slow, and not needed for text on the screen.
-    from importlib.metadata import version as installed
+    from trihedron.files.calibration import written_by
 
-    rows.append(("version", f"trihedron {installed('trihedron')}, Python {platform.python_version()}"))
+    rows.append(("version", f"{written_by()}, Python {platform.python_version()}"))
     rows += [("input", f"{source}, sha256 {sha256 or 'not computed'}") for source, sha256 in run.inputs]
     said = {key: value for key, value in run.options.items() if value not in (None, False, "", [], ())}
     options = [f"{key.replace('_', '-')} {_shown(value)}" for key, value in said.items()]

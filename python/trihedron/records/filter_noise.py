@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from trihedron.records.finding import Finding
+from trihedron.records.finding import Finding, Judged
 from trihedron.records.plain import Plain
 from trihedron.records.presented import Printed
 
@@ -136,7 +136,7 @@ class IntervalCheck(Plain):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FilterNoise(Printed):
+class FilterNoise(Judged, Printed):
     """Filter noise of a log: its sensors, and without a reference the checks on its static intervals.
 
     ``static_source`` is the static log that was given; without one static values are of this log's own rest.

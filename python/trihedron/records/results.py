@@ -1,10 +1,10 @@
 """Results of the public functions: records, shown as a laboratory report by ``print``."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from trihedron.answers import ask
-from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.finding import Judged
 from trihedron.records.kalman import KalmanCalibration, NormKalmanCalibration
@@ -15,8 +15,22 @@ from trihedron.records.sessions import SessionsModel
 from trihedron.sanitise import one_line
 
 
+class HasCalibration(Protocol):
+    @property
+    def calibration(self) -> Calibration: ...
+
+
+class Calibrated(Judged, Printed):
+    """A result with a calibration."""
+
+    @property
+    def findings(self: HasCalibration) -> tuple[Finding, ...]:
+        """Findings of every stage; for many recordings those on all together."""
+        return self.calibration.findings
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibrationResult(Judged, Printed):
+class CalibrationResult(Calibrated):
     """A calibration with the segments and the recording that it was made from. ``print`` gives the report.
 
     Attributes
@@ -56,18 +70,13 @@ class CalibrationResult(Judged, Printed):
         """``ω = S w' + b``, or ``None`` where there was no gyro or it was not determined."""
         return self.calibration.gyroscope
 
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings of every stage."""
-        return self.calibration.findings
-
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
         return f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_poses} poses>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VerificationResult(Printed):
+class VerificationResult(Judged, Printed):
     """A calibration judged on another recording. ``print`` gives the report.
 
     Attributes
@@ -93,22 +102,19 @@ class VerificationResult(Printed):
     segments: Segments
     recording: Recording
 
+    is_passed = Judged.is_trustworthy
+
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Findings of the verification."""
         return self.verification.findings
-
-    @property
-    def is_passed(self) -> bool:
-        """No serious finding."""
-        return self.verification.is_passed
 
     def __repr__(self) -> str:
         return f"<VerificationResult on {one_line(self.recording.source)}: {self.verification.norm_rms:.3g} m/s² rms>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CheckResult(Printed):
+class CheckResult(Judged, Printed):
     """Whether a log is fit for calibration. ``print`` gives the report.
 
     Attributes
@@ -131,10 +137,7 @@ class CheckResult(Printed):
     calibration: Calibration | None
     findings: tuple[Finding, ...]
 
-    @property
-    def is_fit(self) -> bool:
-        """No serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+    is_fit = Judged.is_trustworthy
 
     def __repr__(self) -> str:
         return (
@@ -207,7 +210,7 @@ class DiagnosisResult(Diagnosis, Presented):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KalmanResult(Judged, Printed):
+class KalmanResult(Calibrated):
     """Result of the Kalman filter, with the segments and the recording that it is from. ``print`` gives the report.
 
     Attributes
@@ -231,30 +234,20 @@ class KalmanResult(Judged, Printed):
     segments: Segments
     recording: Recording
 
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings of every stage."""
-        return self.calibration.findings
-
     def __repr__(self) -> str:
         return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"
 
 
 @dataclass(frozen=True, eq=False)
-class ReferencesResult(Judged, Printed):
+class ReferencesResult(Calibrated):
     """The unit's ``calibration``; ``references`` are the fits to each recording: bias, clock, error."""
 
     calibration: Calibration
     references: tuple[AgainstReference, ...]
 
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings on all recordings together."""
-        return self.calibration.findings
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SessionsResult(Judged, Printed):
+class SessionsResult(Calibrated):
     """Many recordings as one model, with each recording's own calibration. ``print`` gives the report.
 
     Attributes
@@ -279,11 +272,6 @@ class SessionsResult(Judged, Printed):
     def calibration(self) -> Calibration:
         """The common calibration, with the covariance that is valid for the next session."""
         return self.model.calibration
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings on all recordings together; those on one are its result's."""
-        return self.model.findings
 
     def __repr__(self) -> str:
         return f"<SessionsResult of {len(self.model.sessions)} recordings by {self.model.by}>"

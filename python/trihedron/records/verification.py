@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray, rms_of
-from trihedron.records.finding import Finding, Severity
+from trihedron.records.finding import Finding, Judged
 from trihedron.records.presented import Presented
 from trihedron.sanitise import one_line
 
@@ -40,7 +40,7 @@ class JudgedParameter:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verification(Presented):
+class Verification(Judged, Presented):
     """Errors of the calibration of ``calibration_source`` on another recording, with their expected size.
 
     ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every pose [m/s²], ``norm_noise`` (n,) its standard deviation by the
@@ -100,10 +100,7 @@ class Verification(Presented):
         """Expected rms of the tilt error, by noise and the calibration's uncertainty [deg]; NaN without moves."""
         return rms_of(self.angle_sigma_deg) if len(self.angle_deg) else float("nan")
 
-    @property
-    def is_passed(self) -> bool:
-        """True without a serious finding."""
-        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+    is_passed = Judged.is_trustworthy
 
     def __repr__(self) -> str:
         return (

@@ -71,7 +71,6 @@ def calibration_report(
         title="Calibration",
         subtitle=calibration.recording_source or "no recording named",
         verdict=verdict(calibration, errors_beside),
-        is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
         lead=lead_picture(calibration, segments),
         next_step=NEXT if calibration.is_trustworthy else "",

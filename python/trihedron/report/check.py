@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from trihedron.records import Calibration, Finding, Recording, Segments
+from trihedron.records import Calibration
+from trihedron.records.results import CheckResult
 from trihedron.report.axes import axes_of
 from trihedron.report.calibration import next_pose
 from trihedron.report.document import Block, Document, Facts, Section, Table
@@ -14,10 +15,9 @@ from trihedron.units import mrad_from_radians
 NONE = "–"
 
 
-def check_report(
-    recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
-) -> Document:
-    """Lay out the audit; ``calibration`` gives the uncertainties to expect."""
+def check_report(result: CheckResult) -> Document:
+    """Lay out the audit, and the uncertainties to expect."""
+    recording, segments, calibration = result.recording, result.segments, result.calibration
     blocks: list[Block] = [channels_table(recording)]
     if calibration is not None:
         rows = tuple((name, *cells) for name, cells in _expected_cells(calibration).items())
@@ -33,11 +33,10 @@ def check_report(
     return Document(
         title="Check of a log",
         subtitle=recording.source,
-        verdict=verdict_of(findings, f"{good}.", good, bad),
-        is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
+        verdict=verdict_of(result.findings, f"{good}.", good, bad),
         sections=(
             Section("Result", (Facts(recording_facts(recording, segments)), *blocks)),
-            Section("Findings", (findings_block(findings),)),
+            Section("Findings", (findings_block(result.findings),)),
         ),
         lead=signals_picture(recording, segments),
         next_step="Calibrate: `trihedron calibrate LOG --latitude DEG -o calibration.json`.",

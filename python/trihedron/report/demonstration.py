@@ -55,7 +55,6 @@ def demonstration_report(comparison: Comparison, before_m_s2: float, after_m_s2:
         verdict=f"Gravity error in static poses of a session that the calibration has not seen: "
         f"{in_mm_s2(before_m_s2)} rms before, {in_mm_s2(after_m_s2)} after. {within} of {n} parameters lie within 2 σ "
         "of the truth.",
-        is_trustworthy=True,
         sections=(
             Section("Compare with the truth", (_truth_table(comparison), Paragraph(coverage))),
             Section("Files", (_files(folder, _OF_CALIBRATION),)),

@@ -103,7 +103,6 @@ def diagnosis_report(diagnosis: Diagnosis, model: str = "", improved: str = "") 
         title="Diagnosis against a model" if diagnosis.parameters else "Diagnosis",
         subtitle=f"{diagnosis.recording_source} against {model}" if is_compared else diagnosis.recording_source,
         verdict=whole_verdict(diagnosis) + (hidden_by(found) if diagnosis.verdict == "consistent" else ""),
-        is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
         lead=forest_picture(diagnosis.parameters) if differing else worst_picture(diagnosis),
         next_step=next_step_in_words(diagnosis, model, improved),

@@ -114,14 +114,13 @@ class Document:
     """A whole report. The first section is the one that fits one screen.
 
     The ``lead`` figure is next to the verdict; ``stated_level`` is the colour without a serious finding, in place of
-    that from ``is_trustworthy`` (good only without warnings); ``provenance`` is how the report was made; ``next_step``
-    is the advice for the use of the result.
+    that of the findings (good only without warnings); ``provenance`` is how the report was made; ``next_step`` is the
+    advice for the use of the result.
     """
 
     title: str
     subtitle: str
     verdict: str
-    is_trustworthy: bool
     sections: tuple[Section, ...] = field(default=())
     lead: Picture | None = None
     stated_level: Level | None = None
@@ -135,8 +134,6 @@ class Document:
             return "bad"
         if self.stated_level in _WRONG:
             return self.stated_level
-        if not self.is_trustworthy and self.stated_level is None:
-            return "bad"
         is_warned = any(finding.severity is Severity.WARNING for finding in self.findings)
         return "usable" if is_warned else "good"
 

@@ -51,14 +51,12 @@ def filter_noise_report(found: FilterNoise) -> Document:
     sections.append(Section("Findings", (findings_block(found.findings),)))
     # Where a calibration removes most of the error, it comes first.
     uncalibrated = (action_in_words(f) for f in found.findings if f.code == "filter-noise-uncalibrated")
-    is_trustworthy = not any(f.severity.value == "serious" for f in found.findings)
     return Document(
         title="Noise for your filter",
         subtitle=escaped(found.source),
         verdict=verdict_of(found.findings, _good(found), "Usable" + _predicted(found), "NOT TO BE TRUSTED"),
-        is_trustworthy=is_trustworthy,
         sections=tuple(sections),
-        next_step=next(uncalibrated, NEXT if len(found.sensors) == 2 else OF_ONE) if is_trustworthy else "",
+        next_step=next(uncalibrated, NEXT if len(found.sensors) == 2 else OF_ONE) if found.is_trustworthy else "",
     )
 
 

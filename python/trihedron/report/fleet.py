@@ -82,15 +82,15 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict += f" {_named(outliers)} outside the others (most: {first.serial}, {what} by {away})."
     if moved:
         verdict += f" {_named(moved)} changed between sessions, or the logs are of several units."
+    is_doubtful = n_usable < n or opened or outliers or moved
     return Document(
         title="Fleet",
         subtitle=f"{how_many(n, 'log')}, {n_devices}",
         verdict=verdict,
-        is_trustworthy=n_usable > 0 and not mixed,
         sections=tuple(sections),
         lead=lead,
         next_step=next_step_of_fleet(summary, outliers, moved),
-        stated_level="usable" if n_usable and not mixed and (n_usable < n or opened or outliers or moved) else None,
+        stated_level="bad" if mixed or not n_usable else "usable" if is_doubtful else None,
     )
 
 

@@ -58,7 +58,6 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
             f"{WITHIN}{residual} {in_mm_s2(rms_of(outcome.residual_m_s2))} rms" if is_tested else "Usable",
             "NOT TO BE TRUSTED",
         ),
-        is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
         lead=Picture("innovations", _INNOVATIONS, partial(innovations_chart, results)) if is_tested else None,
         next_step=TEST if calibration.is_trustworthy else "",

@@ -4,8 +4,9 @@ import json
 from typing import Any
 
 from trihedron.files.calibration import calibration_document, plain
-from trihedron.records import Calibration, Finding, Recording, Segments, Verification
+from trihedron.records import Calibration, Recording, Segments, Verification
 from trihedron.records.published import published_figures
+from trihedron.records.results import CheckResult
 from trihedron.records.sessions import Session, SessionsModel
 from trihedron.report.segments import channels_record
 from trihedron.sanitise import escaped_json
@@ -93,20 +94,18 @@ def verification_record(verification: Verification) -> dict[str, Any]:
     }
 
 
-def check_record(
-    recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
-) -> dict[str, Any]:
+def check_record(result: CheckResult) -> dict[str, Any]:
     """The audit, and the uncertainties to expect."""
     expected = {
         name: {"sigma_S": sensor.sigma_S, "sigma_b": sensor.sigma_b, "si_unit": sensor.si_unit}
-        for name, sensor in (() if calibration is None else calibration.sensors)
+        for name, sensor in (() if result.calibration is None else result.calibration.sensors)
     }
     return {
-        **segments_record(segments, recording),
-        "is_fit": not any(finding.severity.value == "serious" for finding in findings),
+        **segments_record(result.segments, result.recording),
+        "is_fit": result.is_fit,
         "expected": expected,
-        "channels": channels_record(recording),
-        "findings": [finding.to_dict() for finding in findings],
+        "channels": channels_record(result.recording),
+        "findings": [finding.to_dict() for finding in result.findings],
     }
 
 

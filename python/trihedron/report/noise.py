@@ -44,7 +44,6 @@ def noise_report(
         title="Noise of a static log",
         subtitle=noise.source,
         verdict=verdict_of(findings, _good(noise), _usable(noise), "NOT TO BE TRUSTED"),
-        is_trustworthy=noise.is_trustworthy,
         stated_level="usable" if noise.shows_white_alone else None,
         lead=noise_picture(noise) if groups else None,
         next_step=_next(noise) if noise.is_trustworthy else "",

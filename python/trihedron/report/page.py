@@ -5,14 +5,13 @@ import hashlib
 import re
 from dataclasses import replace
 from functools import cache
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as installed
 from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
+from trihedron.files.calibration import written_by
 from trihedron.records import Severity
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawn import drawn
@@ -62,7 +61,7 @@ def to_html(document: Document) -> str:
         document=replace(document, title=one_line(document.title), subtitle=one_line(document.subtitle)),
         sections=sections,
         lead=lead,
-        version=_version(),
+        version=written_by(),
         style=Markup(_file("page.css")),
         script=Markup(script),
         policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'",
@@ -133,13 +132,6 @@ def _file(name: str) -> str:
     """A file that is part of every page, without indents and comments."""
     text = _COMMENT.sub("", (files("trihedron.report") / name).read_text(encoding="utf-8"))
     return "\n".join(line.strip() for line in text.splitlines() if line.strip())
-
-
-def _version() -> str:
-    try:
-        return installed("trihedron")
-    except PackageNotFoundError:
-        return ""
 
 
 def _shown(block: Block) -> dict[str, Any]:

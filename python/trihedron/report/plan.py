@@ -36,7 +36,6 @@ def plan_report(plan: ExperimentPlan) -> Document:
         ),
         verdict=f"{_enough(best)}Known turns of {angles} in {turns.duration_s:g} s about each axis{known} give the "
         f"gyro's scale to {_percent(turns.scale)}{_beside_moves(plan)}.{remedy}",
-        is_trustworthy=True,
         stated_level="usable" if remedy else "good",
         next_step=_next_step(plan),
         sections=(

@@ -70,11 +70,7 @@ _KINDS: dict[type, _Shown] = {
         lambda r: machine.verification_record(r.verification),
         lambda r: frames.verification_columns(r.verification),
     ),
-    CheckResult: _Shown(
-        lambda r: check_report(r.recording, r.segments, r.calibration, r.findings),
-        lambda r: machine.check_record(r.recording, r.segments, r.calibration, r.findings),
-        lambda r: frames.segments_columns(r.segments),
-    ),
+    CheckResult: _Shown(check_report, machine.check_record, lambda r: frames.segments_columns(r.segments)),
     DiagnosisResult: _Shown(diagnosis_report, lambda r: r.to_dict(), frames.diagnosis_columns),
     KalmanResult: _Shown(
         lambda r: kalman_report(r.outcome, r.calibration),

@@ -53,7 +53,7 @@ def ranking_report(ranking: Ranking) -> Document:
         title="Ranking of calibrations",
         subtitle=ranking.source,
         verdict=verdict,
-        is_trustworthy=not best.is_rejected,
+        stated_level="bad" if best.is_rejected else None,
         sections=tuple(sections),
         next_step="Calibrate again: none of these fits this log." if best.is_rejected else use_in_words(v, best.name),
     )

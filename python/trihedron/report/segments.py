@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import AXES, XYZ, FloatArray
-from trihedron.records import Finding, Pose, Recording, Segments, Severity, Truth
+from trihedron.records import Finding, Pose, Recording, Segments, Truth
 from trihedron.records.channel_facts import Limit, LowPass
 from trihedron.records.noise import least_length_s
 from trihedron.report.chart import AXIS_COLOURS, Chart, Colour, Level, Line, Panel, Scale, Span
@@ -33,7 +33,6 @@ def segments_report(segments: Segments, recording: Recording | None = None) -> D
         title="Poses and moves",
         subtitle="" if recording is None else recording.source,
         verdict=verdict_of(findings, f"{found}.", found, "NOT FIT"),
-        is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in findings),
         sections=(
             Section("Result", (Facts(facts),)),
             Section("Findings", (findings_block(findings),)),
@@ -174,7 +173,6 @@ def recording_summary(recording: Recording) -> Document:
         title="Recording",
         subtitle=recording.source,
         verdict=verdict_of(recording.findings, "OK: no problems found.", "Read", "DOUBTFUL"),
-        is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in recording.findings),
         sections=(
             Section("Recording", (Facts(facts),)),
             Section("Findings", (findings_block(recording.findings),)),

@@ -77,7 +77,6 @@ def sessions_report(model: SessionsModel) -> Document:
         title="Calibration from many recordings",
         subtitle=", ".join(names) if n <= MOST_NAMED else f"{', '.join(names[:3])} ... {names[-1]}",
         verdict=verdict_of(others, f"{usable}." if changed else f"OK: {agree}.", usable, "NOT TO BE TRUSTED"),
-        is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
         lead=_lead(model),
         next_step=NEXT if model.is_trustworthy else "",

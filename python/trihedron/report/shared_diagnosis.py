@@ -49,7 +49,6 @@ def shared_diagnosis_report(found: SharedDiagnosis) -> Document:
         title="Diagnosis of several recordings",
         subtitle=", ".join(names),
         verdict=" ".join([*wrong, verdict]),
-        is_trustworthy=not found.effects,
         sections=(
             Section("Effects that all recordings share", _effects(found, names)),
             Section("Each recording by itself", (_each(found, names),)),

@@ -52,7 +52,6 @@ def simulation_report(
         title="Simulation",
         subtitle=recording.source,
         verdict=" ".join([verdict, *(likely(one.cause) for one in doubts)]),
-        is_trustworthy=True,
         sections=(
             Section("Result", (Facts(facts),)),
             *((Section("Findings on the repeated recording", (findings_block(findings),)),) if findings else ()),

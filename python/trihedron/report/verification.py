@@ -56,7 +56,6 @@ def verification_report(
         title="Verification",
         subtitle=f"{made_from}, tested on {v.source}",
         verdict=verified_in_words(v),
-        is_trustworthy=verification.is_passed,
         sections=tuple(sections),
         lead=Picture("errors", caption, partial(verification_chart, v)),
         next_step=use_in_words(v, "the calibration"),
