@@ -10,13 +10,7 @@ from typing import Any
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import read, segment
-from trihedron.api.referring import (
-    AnyReference,
-    calibration_by,
-    diagnosis_by,
-    effects_of,
-    held_against,
-)
+from trihedron.api.referring import AnyReference, calibration_by, diagnosis_by, effects_of, held_against
 from trihedron.api.simulating import names_scenario
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.reference.fit import moves_along

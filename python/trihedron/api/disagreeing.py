@@ -23,14 +23,7 @@ from trihedron.report.demonstration import disagreement_report, with_files
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document
 from trihedron.report.page import to_html
-from trihedron.simulate import (
-    Environment,
-    Scenario,
-    hand_session,
-    profile_by_name,
-    simulate,
-    with_effect,
-)
+from trihedron.simulate import Environment, Scenario, hand_session, profile_by_name, simulate, with_effect
 
 Draw = Callable[[np.random.Generator], dict[str, Any]]
 LATITUDE_DEG = 59.94

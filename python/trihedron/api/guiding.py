@@ -19,10 +19,7 @@ from trihedron.estimate.next_pose import best_next, is_determined, planned, pose
 from trihedron.records import Calibration, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
 from trihedron.records.results import CalibrationResult, VerificationResult
-from trihedron.units import (
-    STANDARD_GRAVITY_M_S2,
-    acceleration_to_si,
-)
+from trihedron.units import STANDARD_GRAVITY_M_S2, acceleration_to_si
 
 SHORTEST_POSE_S, LONGEST_POSE_S = 3.0, 12.0
 USUAL_POSE_S = 4.0

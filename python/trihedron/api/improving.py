@@ -21,14 +21,7 @@ from trihedron.comparison.ranges import SENSOR
 from trihedron.documents import parse_toml
 from trihedron.files.scenario import improved_scenario
 from trihedron.records.results import DiagnosisResult
-from trihedron.simulate import (
-    Drift,
-    Scenario,
-    diagnosed_sizes,
-    noise_from_poses,
-    read_scenario,
-    scenario_from_table,
-)
+from trihedron.simulate import Drift, Scenario, diagnosed_sizes, noise_from_poses, read_scenario, scenario_from_table
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from trihedron.api.applying import (
-    AnyCalibration,
-    calibration_of,
-    check_units,
-    without_effects,
-)
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.api.choices import settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.api.verifying import on_log, own_calibration

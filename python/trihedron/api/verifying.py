@@ -7,13 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.api.applying import (
-    AnyCalibration,
-    calibration_of,
-    check_units,
-    doubted,
-    without_effects,
-)
+from trihedron.api.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.api.calibrating import calibrate
 from trihedron.api.choices import gravity_of, settle_gravity
 from trihedron.api.reading import AnyRecording, recording_of, segments_of

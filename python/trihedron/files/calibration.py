@@ -21,14 +21,7 @@ from trihedron.arrays import FloatArray
 from trihedron.documents import read_json
 from trihedron.errors import InputError
 from trihedron.files.output import write_whole
-from trihedron.records import (
-    PARAMETER_NAMES,
-    Calibration,
-    Finding,
-    FitQuality,
-    Observability,
-    SensorCalibration,
-)
+from trihedron.records import PARAMETER_NAMES, Calibration, Finding, FitQuality, Observability, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.plain import as_plain, from_plain
 from trihedron.sanitise import escaped_json

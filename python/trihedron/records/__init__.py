@@ -23,15 +23,7 @@ from trihedron.records.kalman import (
     NormKalmanCalibration,
     PoseTable,
 )
-from trihedron.records.noise import (
-    GaussMarkov,
-    Noise,
-    NoiseAxis,
-    NoiseTerm,
-    SlowPair,
-    SpectralLine,
-    TermName,
-)
+from trihedron.records.noise import GaussMarkov, Noise, NoiseAxis, NoiseTerm, SlowPair, SpectralLine, TermName
 from trihedron.records.onboard import Onboard
 from trihedron.records.recording import Recording
 from trihedron.records.sampling import Sampling, TimestampKind

@@ -8,12 +8,7 @@ from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table
-from trihedron.report.diagnosis_charts import (
-    before_after_chart,
-    forest_picture,
-    noise_pictures,
-    traces_picture,
-)
+from trihedron.report.diagnosis_charts import before_after_chart, forest_picture, noise_pictures, traces_picture
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.diagnosis_numbers import (

@@ -8,14 +8,7 @@ from trihedron.report.calibration import shared_power
 from trihedron.report.diagnosis_words import parameter_in_words, size_in_words, value_in_words
 from trihedron.report.document import Block, Facts, Table
 from trihedron.report.names import id_in_print, ids_in_print, variable_in_print
-from trihedron.report.numbers import (
-    MINUS,
-    listed,
-    one_of,
-    plain_number,
-    unit_in_print,
-    with_sigma,
-)
+from trihedron.report.numbers import MINUS, listed, one_of, plain_number, unit_in_print, with_sigma
 
 MOST_COEFFICIENTS = 6
 

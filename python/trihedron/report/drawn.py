@@ -7,18 +7,7 @@ from html import escape
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.report.chart import (
-    Band,
-    Bars,
-    Chart,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Span,
-    limits_of,
-)
+from trihedron.report.chart import Band, Bars, Chart, Level, Line, Mark, Panel, Points, Span, limits_of
 from trihedron.report.layout import UNITS, Places, ticks
 from trihedron.report.numbers import plain_number, with_sigma
 

@@ -14,19 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from trihedron.errors import InputError
-from trihedron.report.chart import (
-    Band,
-    Bars,
-    Chart,
-    Colour,
-    Level,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Scale,
-    Span,
-)
+from trihedron.report.chart import Band, Bars, Chart, Colour, Level, Line, Mark, Panel, Points, Scale, Span
 
 # The axes: distinct for colour-blind readers and in grey (Okabe and Ito).
 COLOURS: dict[Colour, str] = {

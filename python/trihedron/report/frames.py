@@ -10,15 +10,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import AXES
 from trihedron.errors import InputError
-from trihedron.records import (
-    PARAMETER_NAMES,
-    Calibration,
-    Noise,
-    Recording,
-    Segments,
-    TermName,
-    Verification,
-)
+from trihedron.records import PARAMETER_NAMES, Calibration, Noise, Recording, Segments, TermName, Verification
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.sessions import SessionsModel
 from trihedron.report.noise_units import PER_UNIT

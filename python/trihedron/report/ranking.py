@@ -7,13 +7,7 @@ from trihedron.records.ranking import Ranked, Ranking, Suspicion
 from trihedron.report.document import Document, Facts, Section, Table
 from trihedron.report.findings import by_weight, findings_block
 from trihedron.report.numbers import how_many, listed, plain_number, with_sigma
-from trihedron.report.verification import (
-    above_noise,
-    imprecise,
-    parameters_table,
-    use_in_words,
-    verified_in_words,
-)
+from trihedron.report.verification import above_noise, imprecise, parameters_table, use_in_words, verified_in_words
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
 
 MISTAKES = {

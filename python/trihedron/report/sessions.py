@@ -10,15 +10,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records import Severity
 from trihedron.records.recording import distinct_names
-from trihedron.records.sessions import (
-    PARAMETERS,
-    Change,
-    Repeated,
-    Session,
-    SessionsModel,
-    Spread,
-    ThermalModel,
-)
+from trihedron.records.sessions import PARAMETERS, Change, Repeated, Session, SessionsModel, Spread, ThermalModel
 from trihedron.report.axes import BIAS, TRIAD
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import USE_IT, Block, Document, Facts, Paragraph, Picture, Section, Table

@@ -8,14 +8,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
-from trihedron.files.formats.contract import (
-    ExportOptions,
-    Format,
-    effect_parameters,
-    given,
-    heading,
-    of_si_readings,
-)
+from trihedron.files.formats.contract import ExportOptions, Format, effect_parameters, given, heading, of_si_readings
 from trihedron.files.formats.from_templates import filled
 from trihedron.files.formats.noise_keys import required
 from trihedron.files.formats.parsing import array_of, without_readings, yaml_of

@@ -4,12 +4,7 @@ import re
 
 import numpy as np
 
-from trihedron.files.formats.contract import (
-    ExportOptions,
-    Format,
-    given,
-    heading,
-)
+from trihedron.files.formats.contract import ExportOptions, Format, given, heading
 from trihedron.files.formats.from_templates import filled
 from trihedron.files.formats.kalibr import g_sensitivity, in_lower, lower_orthogonal
 from trihedron.files.formats.noise_keys import required
