@@ -17,9 +17,8 @@ from trihedron.estimate.gyroscope.lost_samples import missing_samples, relative_
 from trihedron.estimate.gyroscope.turntable import on_turntable
 from trihedron.estimate.verification import reference_findings
 from trihedron.estimate.verified_static_rate import with_static_rate
-from trihedron.records import Calibration, Frame, Recording, Segments, Severity
+from trihedron.records import Calibration, Frame, Progress, Recording, Segments, Severity
 from trihedron.records.plain import as_plain
-from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
 from trihedron.sensor_model import in_frame
 

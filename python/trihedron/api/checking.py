@@ -8,9 +8,8 @@ from trihedron.api.calibrating import calibrate
 from trihedron.api.diagnosing_static_log import MOSTLY, TWO_ORIENTATIONS, is_static_log
 from trihedron.api.reading import COUNTS_OF_POSES, FEWEST_POSES, AnyRecording, recording_of, segment
 from trihedron.errors import INPUT_ERRORS
-from trihedron.records import Finding, Recording, Segments, Severity
+from trihedron.records import Finding, Progress, Recording, Segments, Severity
 from trihedron.records.noise import least_length_s
-from trihedron.records.progress import Progress
 from trihedron.records.results import CheckResult
 from trihedron.records.words import words
 from trihedron.segment.judge import POSES_FOR_NINE

@@ -16,8 +16,7 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.session.starting_point import is_open, nominal, starts_nominal
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.gyroscope.common_scale import without_first_scale
-from trihedron.records import Calibration, Finding, Recording, Segments
-from trihedron.records.progress import Progress
+from trihedron.records import Calibration, Finding, Progress, Recording, Segments
 from trihedron.records.results import DiagnosisResult
 from trihedron.segment import resegment
 

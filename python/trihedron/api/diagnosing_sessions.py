@@ -11,9 +11,9 @@ from trihedron.api.sessions import of_several_units, refuse_again
 from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose import diagnose_recordings
 from trihedron.errors import INPUT_ERRORS, InputError
+from trihedron.records import Progress
 from trihedron.records.calibration import Calibration
 from trihedron.records.diagnosis import SharedDiagnosis
-from trihedron.records.progress import Progress
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.segment import resegment

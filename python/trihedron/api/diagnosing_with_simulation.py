@@ -19,10 +19,9 @@ from trihedron.comparison.slow import correlation_times, slow_noise
 from trihedron.diagnose import diagnose_recording
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.verification import verify_calibration
-from trihedron.records import Calibration, Finding, Recording, Segments
+from trihedron.records import Calibration, Finding, Progress, Recording, Segments
 from trihedron.records.checked import WrongTypeError
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
-from trihedron.records.progress import Progress
 from trihedron.simulate import Scenario
 from trihedron.units import STANDARD_GRAVITY_M_S2
 

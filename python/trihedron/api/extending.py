@@ -13,11 +13,10 @@ from trihedron.api.diagnosing import diagnose
 from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import InputError
-from trihedron.records import Calibration, Finding, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, Progress, SensorCalibration, Severity
 from trihedron.records.checked import WrongTypeError
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import not_explained
-from trihedron.records.progress import Progress
 from trihedron.records.results import CalibrationResult
 from trihedron.records.words import words
 

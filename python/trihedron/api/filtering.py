@@ -24,13 +24,13 @@ from trihedron.records import (
     KalmanCalibration,
     NormKalmanCalibration,
     PoseTable,
+    Progress,
     Recording,
     Segments,
     Severity,
 )
 from trihedron.records.checked import WrongTypeError
 from trihedron.records.noise import Noise, NoiseAxis
-from trihedron.records.progress import Progress
 from trihedron.records.results import KalmanResult
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]

@@ -18,8 +18,7 @@ from trihedron.estimate.ranking import densities, rms_interval, suspicions_of, w
 from trihedron.estimate.verification import verify_calibration
 from trihedron.files.formats import any_calibration
 from trihedron.files.formats.boards import as_logged
-from trihedron.records import Calibration, Recording, Segments, Verification
-from trihedron.records.progress import Progress
+from trihedron.records import Calibration, Progress, Recording, Segments, Verification
 from trihedron.records.ranking import Ranked, Ranking
 from trihedron.segment import averaged
 from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si

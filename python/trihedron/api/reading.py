@@ -8,8 +8,7 @@ from typing import Any
 
 from trihedron.errors import InputError
 from trihedron.read import ReadError, read_recording
-from trihedron.records import Recording, Segments, Severity
-from trihedron.records.progress import Progress
+from trihedron.records import Progress, Recording, Segments, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object

@@ -18,8 +18,7 @@ from trihedron.defaults import FALSE_ALARM
 from trihedron.errors import INPUT_ERRORS, InputError
 from trihedron.estimate.sessions.changes import changes_among, of_another_unit
 from trihedron.estimate.sessions.numbers import sessions_of
-from trihedron.records import Finding, Frame, Recording, Severity
-from trihedron.records.progress import Progress
+from trihedron.records import Finding, Frame, Progress, Recording, Severity
 from trihedron.records.recording import as_arguments
 from trihedron.records.results import CalibrationResult, SessionsResult
 from trihedron.records.sessions import By, Change, Session

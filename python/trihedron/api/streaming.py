@@ -21,8 +21,7 @@ from trihedron.errors import InputError
 from trihedron.files.output import Temporary
 from trihedron.ranges import merged
 from trihedron.read.on_disk import LogOnDisk, Triad
-from trihedron.records import Move, Pose, Recording, Segments
-from trihedron.records.progress import Progress
+from trihedron.records import Move, Pose, Progress, Recording, Segments
 from trihedron.records.results import CalibrationResult
 from trihedron.segment import BlockSums, segment_blocks
 from trihedron.sensor_model import correct

@@ -14,8 +14,7 @@ from trihedron.api.reading import AnyRecording, recording_of, segments_of
 from trihedron.arrays import AXES, rms_of
 from trihedron.errors import INPUT_ERRORS
 from trihedron.estimate.verification import verify_calibration
-from trihedron.records import Calibration, Finding, Recording, Segments, Severity, Verification
-from trihedron.records.progress import Progress
+from trihedron.records import Calibration, Finding, Progress, Recording, Segments, Severity, Verification
 from trihedron.records.results import VerificationResult
 from trihedron.thermal_model import check_range
 from trihedron.units import mg_from_m_s2

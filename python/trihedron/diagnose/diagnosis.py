@@ -28,10 +28,9 @@ from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.starting_point import linear_model, nominal, prior_of, start_state, starts_nominal
 from trihedron.diagnose.shared import shared_effects
 from trihedron.errors import InputError
-from trihedron.records import Calibration, Recording, Segments
+from trihedron.records import Calibration, Progress, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, SharedDiagnosis, Verdict
 from trihedron.records.domains import Domain, DomainTest, Where
-from trihedron.records.progress import Progress
 from trihedron.session.model import Prior, SessionState
 
 

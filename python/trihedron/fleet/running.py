@@ -17,7 +17,7 @@ from trihedron.files.output import write_whole
 from trihedron.fleet.logs import Job, find_jobs
 from trihedron.fleet.summary import FleetResult, summarise, write_tables
 from trihedron.fleet.work import Row, work
-from trihedron.records.progress import Progress
+from trihedron.records import Progress
 
 RESULTS = "results"
 DEATHS = 3

@@ -10,4 +10,4 @@ from trihedron.read.errors import ReadError
 from trihedron.read.on_disk import ChunkedLog, open_chunks
 from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
-from trihedron.records.progress import Progress
+from trihedron.records import Progress

@@ -33,8 +33,7 @@ from trihedron.read.sensors import Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Options
 from trihedron.read.temperature import temperature_of
-from trihedron.records import Finding, Recording
-from trihedron.records.progress import Progress
+from trihedron.records import Finding, Progress, Recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 TIMESTAMPS = "logged time after the first [s]"

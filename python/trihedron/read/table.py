@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.records import Finding, Onboard
-from trihedron.records.progress import Progress
+from trihedron.records import Finding, Onboard, Progress
 from trihedron.records.words import Words, words
 
 

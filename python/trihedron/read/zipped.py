@@ -12,8 +12,7 @@ from trihedron.read.errors import ReadError, errors_of_library, errors_of_system
 from trihedron.read.memory import check_unpacked
 from trihedron.read.names import sensor_said
 from trihedron.read.table import Options, Table
-from trihedron.records import Finding
-from trihedron.records.progress import Progress
+from trihedron.records import Finding, Progress
 
 _OF_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError)
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")

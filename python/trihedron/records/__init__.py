@@ -3,6 +3,8 @@
 One file per subject. A stage takes records and returns records; it never imports another stage.
 """
 
+from collections.abc import Callable
+
 from trihedron.records.allan_curve import AllanCurve
 from trihedron.records.calibration import (
     PARAMETER_NAMES,
@@ -30,3 +32,6 @@ from trihedron.records.sampling import Sampling, TimestampKind
 from trihedron.records.segments import Move, Pose, Segments
 from trihedron.records.truth import Comparison, TrueSegment, Truth
 from trihedron.records.verification import Verification
+
+Progress = Callable[[float, str], None]
+"""Callback of a long step, called with the fraction done (0 to 1) and a few words on the current step."""

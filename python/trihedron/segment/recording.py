@@ -10,8 +10,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.channel_facts.turning import turning_in_blocks
 from trihedron.quantiles import quantiles
 from trihedron.ranges import ranges_of
-from trihedron.records import Finding, Move, Pose, Recording, Segments
-from trihedron.records.progress import Progress
+from trihedron.records import Finding, Move, Pose, Progress, Recording, Segments
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity

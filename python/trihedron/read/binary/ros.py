@@ -12,7 +12,7 @@ from trihedron.read.columns import Sensor, sensor_of_file_name
 from trihedron.read.errors import ReadError, errors_of_library, file_sha256, first_bytes
 from trihedron.read.streams import Stream, choice_note, missing_package, pick
 from trihedron.read.table import Options, Table
-from trihedron.records.progress import Progress
+from trihedron.records import Progress
 
 _SUFFIXES = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite ": ".db3"}
 STARTS = tuple(_SUFFIXES)

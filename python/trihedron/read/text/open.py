@@ -11,8 +11,7 @@ from trihedron.read.text.dialect import Rewritten, has_records, rewrite, split_r
 from trihedron.read.text.json_log import is_json, of_json
 from trihedron.read.text.makers import makers
 from trihedron.read.text.reader import TextReader
-from trihedron.records import Finding
-from trihedron.records.progress import Progress
+from trihedron.records import Finding, Progress
 
 _SAMPLE_BYTES = 1 << 17
 

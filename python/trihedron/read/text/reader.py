@@ -14,8 +14,7 @@ from trihedron.read.table import Table
 from trihedron.read.text.blocks import Lines, blocks, rows_of
 from trihedron.read.text.cells import TextColumn, numbers, parse, text_column
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect
-from trihedron.records import Finding, Severity
-from trihedron.records.progress import Progress
+from trihedron.records import Finding, Progress, Severity
 
 _SAMPLE_BYTES = 1 << 18
 
