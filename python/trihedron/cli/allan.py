@@ -69,8 +69,8 @@ def allan(
         write_whole(csv, curve_csv(found), overwrite=results.force)
         say(f"curve: {csv}")
     if plot is not None:
-        from trihedron.report.drawing import png_of
         from trihedron.report.noise import noise_picture
+        from trihedron.report.presenting import png_of
 
         write_whole(plot, png_of(noise_picture(found)), overwrite=results.force)
         say(f"plot: {plot}")

@@ -8,7 +8,13 @@ from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DOMAINS, DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration_fit import figures_table
-from trihedron.report.diagnosis_charts import before_after_chart, forest_picture, noise_pictures, traces_picture
+from trihedron.report.diagnosis_charts import (
+    before_after_chart,
+    effect_chart,
+    forest_picture,
+    noise_pictures,
+    traces_picture,
+)
 from trihedron.report.diagnosis_models import candidates_blocks, models_blocks, relation_facts
 from trihedron.report.diagnosis_next_step import next_step_in_words
 from trihedron.report.diagnosis_numbers import (
@@ -35,7 +41,6 @@ from trihedron.report.diagnosis_words import (
     whole_verdict,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
-from trihedron.report.effect_charts import effect_chart
 from trihedron.report.findings import findings_block
 from trihedron.report.names import MEANING, id_in_print, ids_in_print, parameter_in_print
 from trihedron.report.numbers import capital, how_many, plain_number

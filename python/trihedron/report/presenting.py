@@ -1,4 +1,4 @@
-"""Presentation of results: report, JSON and columns for each kind of record."""
+"""Presentation of results: report, JSON and columns for each kind of record; figures only where requested."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import os
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from trihedron.errors import InputError
@@ -30,7 +32,7 @@ from trihedron.report import document, frames, machine
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.diagnosis import diagnosis_report, first_screen
-from trihedron.report.drawing import figures
+from trihedron.report.document import Picture
 from trihedron.report.extended import calibration_result_report
 from trihedron.report.filter_noise import filter_noise_columns, filter_noise_record, filter_noise_report
 from trihedron.report.kalman import kalman_record, kalman_report
@@ -206,3 +208,30 @@ def report(result: object, path: str | os.PathLike[str] | None = None, *, overwr
         content = written(laid_out, lambda: plain(shown.record(result)), Path(path))
         write_whole(path, content, overwrite=overwrite)
     return to_text(laid_out)
+
+
+class NoFiguresError(InputError):
+    """Figures are requested, but matplotlib is not installed."""
+
+
+def figures() -> ModuleType:
+    """:mod:`trihedron.report.figures`, the only module that imports matplotlib.
+
+    Raises
+    ------
+    NoFiguresError
+        (a ``ValueError``) when matplotlib is not installed.
+    """
+    try:
+        return import_module("trihedron.report.figures")
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in {"matplotlib", "mpl_toolkits"}:
+            raise
+        raise NoFiguresError("figures need matplotlib, which is not installed: pip install matplotlib.") from None
+
+
+def png_of(picture: Picture) -> bytes:
+    """A figure as the bytes of a PNG file; raises as :func:`figures` does."""
+    library = figures()
+    made: bytes = library.png(library.draw_chart(picture.chart))
+    return made

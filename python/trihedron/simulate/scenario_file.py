@@ -1,16 +1,18 @@
-"""Scenario files (TOML): a profile, a session or steps, overrides of any parameter, and effects by id."""
+"""Scenarios ready-made by name and in files (TOML): profile, session or steps, overrides of parameters, effects."""
 
 import dataclasses
 import enum
 import inspect
 import typing
 from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from trihedron.documents import read_toml
+from trihedron.documents import parse_toml, read_toml
 from trihedron.errors import InputError
 from trihedron.sanitise import meant
 from trihedron.simulate.accelerometer import Accelerometer
@@ -203,3 +205,21 @@ def _tuple_value(items: tuple[Any, ...], value: Any, where: str) -> Any:
     if not isinstance(value, list) or len(value) != len(items):
         raise InputError(f"{where} must hold {len(items)} values (or one for all), got {value!r}")
     return tuple(_value(item, v, None, where) for item, v in zip(items, value, strict=True))
+
+
+@cache
+def _texts() -> dict[str, str]:
+    folder = files("trihedron.simulate").joinpath("scenarios")
+    return {Path(entry.name).stem: entry.read_text(encoding="utf-8") for entry in folder.iterdir()}
+
+
+def list_scenarios() -> dict[str, str]:
+    """Name and one sentence for each ready-made scenario."""
+    return {name: str(parse_toml(text)["about"]) for name, text in sorted(_texts().items())}
+
+
+def scenario_by_name(name: str) -> Scenario:
+    """A ready-made scenario; raises ``InputError`` when no scenario has that name."""
+    if name not in _texts():
+        raise InputError(f"no scenario is called {name!r}; there are {', '.join(sorted(_texts()))}")
+    return scenario_from_table(parse_toml(_texts()[name]), name)
