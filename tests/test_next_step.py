@@ -37,7 +37,7 @@ def found_with(effect_id, *, is_of_unit, **more):
 
 
 def filled(step):
-    return now.with_arguments(Document("A title", "", "OK.", True, next_step=step)).next_step
+    return now.with_arguments(Document("A title", "", "OK.", next_step=step)).next_step
 
 
 @pytest.mark.parametrize(
@@ -120,5 +120,5 @@ def test_what_the_effects_explain_of_the_linear_fit_is_not_the_next_step():
 def test_the_next_step_of_a_verdict_of_its_own_answers_it_and_not_a_warning(own_level, first):
     shaken = Finding("pose-unsteady", Severity.WARNING, "Seen.", "", "Use a firm support.")
     sections = (Section("Findings", (FindingList((shaken,)),)),)
-    document = Document("", "", "Other.", True, sections, stated_level=own_level, next_step="Check the sensor.")
+    document = Document("", "", "Other.", sections, stated_level=own_level, next_step="Check the sensor.")
     assert document.what_next.startswith(first)

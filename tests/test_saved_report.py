@@ -55,7 +55,7 @@ def document():
         Section("Result", (Paragraph("words"), table, picture)),
         Section("Findings", (findings_block((finding,)),)),
     )
-    return Document("A title", "of a log", "Usable.", True, sections, picture)
+    return Document("A title", "of a log", "Usable.", sections, picture)
 
 
 def test_a_report_comes_back_from_json_word_for_word_and_mark_for_mark():
@@ -173,7 +173,7 @@ def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
     table = Table(HEAD, (ROW, ROW), "What every domain says, " + "at length, " * 12)
     facts = Facts((("a label that is far longer than half of a narrow terminal has columns", "text " * 40),))
     section = Section("Where", (table, facts, Paragraph("word " * 80)))
-    long = Document("A title", "a subtitle " * 12, "VERDICT: " + "words " * 40, True, (section,))
+    long = Document("A title", "a subtitle " * 12, "VERDICT: " + "words " * 40, (section,))
     text = to_text(long, width=width)
     assert max(len(line) for line in text.splitlines()) <= width
     # Heads, and names of rows, may stand on several lines.
@@ -185,10 +185,10 @@ def test_no_line_is_wider_than_the_terminal_and_no_cell_is_lost(width):
 
 
 def test_names_from_a_log_steer_no_terminal_and_stay_one_line_of_a_page():
-    hostile = Document("t", "log\x1b[2J.csv", "v", True, (Section("S", (Paragraph("a\x9bb"),)),))
+    hostile = Document("t", "log\x1b[2J.csv", "v", (Section("S", (Paragraph("a\x9bb"),)),))
     assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", to_text(hostile, style=Style(80)))
     sections = (Section("Poses of a\nb", ()),)
-    page = to_html(Document("a\nb\x1b.csv", "/logs/a\nNOT TO BE TRUSTED\t.csv", "v", True, sections))
+    page = to_html(Document("a\nb\x1b.csv", "/logs/a\nNOT TO BE TRUSTED\t.csv", "v", sections))
     assert r"/logs/a\nNOT TO BE TRUSTED\t.csv" in page
     assert "a\nNOT TO BE" not in page
     assert not re.search("a\nb|[\x00-\x09\x0b-\x1f\x7f-\x9f]", page)

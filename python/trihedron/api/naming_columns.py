@@ -12,17 +12,12 @@ import numpy.typing as npt
 from trihedron.arrays import AXES
 from trihedron.errors import InputError
 from trihedron.protocols.lines import LineColumns, NameColumns
-from trihedron.read.clock.unit import TICKS, parse_time_unit, seconds_of
+from trihedron.read.clock.unit import TICKS, Witness, parse_time_unit, seconds_of
+from trihedron.read.clock.unit import time_unit as likely_unit
 from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
 
 Cells = npt.NDArray[np.float64]
-
-PLAUSIBLE_HZ = (2.0, 20_000.0)
-"""Plausible rates of a board's stream: outside them the time step is in another unit."""
-
-USUAL_HZ = 100.0
-"""Of two units that fit a time step, the one whose rate is nearer to this in ratio is used."""
 
 
 def column_namer(mapping: str | None = None, time_unit: str | None = None) -> NameColumns:
@@ -42,9 +37,11 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
         if columns.time is not None and not stated and _counts_lines(cells[:, columns.time]):
             # Samples, or milliseconds at exactly 1 kHz: a counter shows losses, and the host's clock gives the rate.
             columns = replace(columns, time=None, counter=columns.time)
-        unit = stated or _unit_of_step(cells, columns.time)
+        if columns.time is not None and not stated:
+            raw = cells[:, columns.time]
+            stated = likely_unit(raw[np.isfinite(raw)], "", None, False, Witness(), [])
         labels = _labels(columns, names, cells.shape[1], is_mapped=mapping is not None)
-        return LineColumns(labels, columns.time, 1e-3 if not unit else seconds_of(unit), columns.counter)
+        return LineColumns(labels, columns.time, seconds_of(stated or "ms"), columns.counter)
 
     return name
 
@@ -95,19 +92,6 @@ def _counts_lines(values: Cells) -> bool:
     """Whether numbers (n,) rise by one from line to line, except where lines are lost or the counter wraps."""
     steps = np.diff(values)
     return len(steps) > 1 and bool(np.mean(steps == 1.0) > 0.7) and bool(np.all(values == np.rint(values)))
-
-
-def _unit_of_step(cells: Cells, column: int | None) -> str:
-    if column is None:
-        return ""
-    steps = np.diff(cells[:, column])
-    steps = steps[np.isfinite(steps) & (steps > 0)]
-    if len(steps) == 0:
-        return ""
-    step = float(np.median(steps))
-    rates = {unit: 1.0 / (step * seconds_of(unit)) for unit in ("s", "ms", "us", "ns")}
-    fitting = {u: hz for u, hz in rates.items() if PLAUSIBLE_HZ[0] <= hz <= PLAUSIBLE_HZ[1]}
-    return min(fitting or rates, key=lambda unit: abs(math.log(rates[unit] / USUAL_HZ)))
 
 
 def _number(cell: str) -> float:

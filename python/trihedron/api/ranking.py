@@ -67,7 +67,7 @@ def rank(
     if len(calibrations) < 2:
         raise InputError("a ranking needs two calibrations at least; one is judged by `trihedron verify`.")
     recording = recording_of(recording, latitude_deg)
-    named = [(_name(given, k), _read(given)) for k, given in enumerate(calibrations)]
+    named = [_named(given, k) for k, given in enumerate(calibrations)]
     stated = [known.gravity_m_s2 for _, known in named if "maker" not in known.extensions]
     of_files = (float(np.median(stated)), "that of the calibrations") if stated else None
     gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m, of_files)
@@ -140,9 +140,7 @@ def _on_this_log(known: Calibration, recording: Recording) -> Calibration:
     return replace(known, accelerometer=accel, gyroscope=gyro)
 
 
-def _read(given: AnyCalibration) -> Calibration:
-    return any_calibration(given) if isinstance(given, str | os.PathLike) else calibration_of(given)
-
-
-def _name(given: AnyCalibration, k: int) -> str:
-    return Path(given).name if isinstance(given, str | os.PathLike) else f"calibration {k + 1}"
+def _named(given: AnyCalibration, k: int) -> tuple[str, Calibration]:
+    if isinstance(given, str | os.PathLike):
+        return Path(given).name, any_calibration(given)
+    return f"calibration {k + 1}", calibration_of(given)

@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from trihedron.cli.options import LogSource, with_options
-from trihedron.cli.output import check_outputs, leave, say, write_json
+from trihedron.cli.output import Results, leave, say
 from trihedron.cli.run import note_file, with_commands
 from trihedron.cli.streamed import apply_stream
 
@@ -25,7 +25,8 @@ def apply(
     force: bool = False,
 ) -> None:
     """Apply a calibration to a log: time [s], specific force [m/s^2], angular rate [rad/s]."""
-    check_outputs(output, json, force=force, inputs=(*source.files, calibration))
+    results = Results(json, force=force)
+    results.check(output, inputs=(*source.files, calibration))
     if stream:
         if str(output) == "-" or json is not None:
             raise typer.BadParameter("--stream writes one file: give -o FILE.npy, and no --json")
@@ -56,5 +57,5 @@ def apply(
         if is_told and one.severity is not Severity.SERIOUS:
             seen = one.seen if one.severity is Severity.NOTE else f"{one.severity.value}: {one.seen}"
             say(with_commands(" ".join(filter(None, (seen, likely(one.cause), one.action and f"→ {one.action}")))))
-    write_json(lambda: recording_record(done), json, force=force)
+    results.write_json(lambda: recording_record(done))
     leave(done.findings)

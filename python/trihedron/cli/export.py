@@ -6,7 +6,7 @@ from typing import Any
 import typer
 
 from trihedron.cli.options import with_options
-from trihedron.cli.output import check_outputs, leave, say
+from trihedron.cli.output import Results, leave, say
 
 LOSSES = ("lost", "Not in this file", "upper limit", "NOT TO BE TRUSTED")
 """Words that mark lines of a file about information that the format cannot represent."""
@@ -55,7 +55,7 @@ def export(
     if folder is not None and folder.is_file():
         raise typer.BadParameter(f"{len(calibration)} calibrations need a folder, and {output} is a file")
     names = _names(calibration)
-    check_outputs(*(() if folder else (output,)), force=force, inputs=(*calibration, noise))
+    Results(force=force).check(*(() if folder else (output,)), inputs=(*calibration, noise))
     from trihedron.api.exporting import export as made_of
     from trihedron.files.formats import any_calibration
     from trihedron.files.noise import read_noise_findings
@@ -97,7 +97,7 @@ def _put(made: dict[str, str], place: Path | None, to: str, force: bool, inputs:
     if place is None:
         typer.echo("\n".join(made.values()), nl=False)
         return
-    check_outputs(*placed(made, place), force=force, inputs=inputs)
+    Results(force=force).check(*placed(made, place), inputs=inputs)
     for target in placed(made, place, write=True, overwrite=force):
         say(f"written for {to}: {target}")
 

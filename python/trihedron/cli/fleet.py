@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from trihedron.cli.options import GravitySource, progress, with_options
-from trihedron.cli.output import NOT_TO_BE_TRUSTED, check_outputs, say, show, write_json, write_report
+from trihedron.cli.output import NOT_TO_BE_TRUSTED, FullResults, say
 
 OPTIONS = {
     "logs": typer.Argument(metavar="DIR|GLOB...", help="Folder with logs, pattern such as 'logs/*.csv', or logs."),
@@ -41,7 +41,7 @@ def fleet(
     force: bool = False,
 ) -> None:
     """Calibrate and diagnose many logs of many devices: one table, one page."""
-    check_outputs(json, force=force)
+    FullResults(json, force=force).check()
     from trihedron.fleet import fleet as run
     from trihedron.report.fleet import fleet_report
 
@@ -62,10 +62,10 @@ def fleet(
         )
     document = fleet_report(result.summary)
     shown = tuple(section for section in document.sections if section.heading != "Every log")
-    show(document, json, sections=len(shown))
-    write_json(lambda: {"rows": list(result.rows)}, json, force=force, document=document)
-    # Again, with how it was made.
-    write_report(document, lambda: {}, out / "fleet.html", force=True)
+    # The page again, with how it was made.
+    results = FullResults(json, out / "fleet.html", force=True)
+    results.show(document, len(shown))
+    results.write(document, lambda: {"rows": list(result.rows)})
     say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}")
     say(f"calibrations, for export, verify and apply: {out / 'calibrations'}")
     if document.level == "bad":

@@ -43,12 +43,12 @@ def guide(
 ) -> None:
     """Replay a log through the guide of capture, which names the next pose after each, then calibrate and verify."""
     from trihedron.api.replaying import replay
-    from trihedron.cli.output import check_outputs, put
+    from trihedron.cli.output import Results, put
     from trihedron.cli.screen import as_text
     from trihedron.records.guiding import Accuracy
 
     wanted = Accuracy.parse(accuracy)
-    check_outputs(output, force=force, inputs=source.files)
+    Results(force=force).check(output, inputs=source.files)
 
     def notify(view: GuideView) -> None:
         put(_line(view) + "\n")

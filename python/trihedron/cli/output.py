@@ -28,54 +28,8 @@ FIRST_SCREEN = 2
 """Sections of a report that are printed without ``--full``."""
 
 
-def check_outputs(
-    *paths: Path | None, force: bool, report: Path | None = None, inputs: Iterable[Path | None] = ()
-) -> None:
-    """Reject outputs that cannot be written, before minutes of work; none of ``inputs`` is overwritten."""
-    if report is not None:
-        check_report(report)
-    check_free([*paths, report], overwrite=force, inputs=inputs)
-
-
 Machine = Callable[[], dict[str, Any]]
 """Makes the JSON of a result; called only where that is requested."""
-
-
-def write_report(document: Document, machine: Machine, report: Path | None, *, force: bool) -> None:
-    """Write the report in the format of its file's ending."""
-    if report is None:
-        return
-    from trihedron.report.saved import written
-
-    content = written(_with_provenance(document), machine, report)
-    write_whole(report, content, overwrite=force)
-    say(f"report: {report}")
-
-
-def _with_provenance(document: Document) -> Document:
-    """The document with its provenance; a saved one keeps its own."""
-    return document if document.provenance else with_provenance(with_arguments(document))
-
-
-def write_json(machine: Machine, target: Path | None, *, force: bool, document: Document | None = None) -> None:
-    """Write the JSON to a file or ('-') stdout; a file includes the report, for ``trihedron report``.
-
-    Called after every other file is written, since the reader of stdout may have closed the pipe.
-    """
-    if target is None:
-        return
-    from trihedron.report.machine import json_text
-
-    if is_stdout(target):
-        typer.echo(json_text(machine()), nl=False)
-        return
-    content = machine()
-    if document is not None:
-        from trihedron.report.saved import with_report
-
-        content = with_report(content, _with_provenance(document))
-    write_whole(target, json_text(content), overwrite=force)
-    say(f"JSON: {target}")
 
 
 @dataclass(frozen=True)
@@ -87,8 +41,11 @@ class Results:
     force: bool = False
 
     def check(self, *more: Path | None, inputs: Iterable[Path | None] = ()) -> None:
-        """As :func:`check_outputs`, with ``more`` files that the command writes."""
-        check_outputs(*more, self.json, force=self.force, report=self.report, inputs=inputs)
+        """Reject outputs, and ``more`` files, that cannot be written, before minutes of work; none of ``inputs`` is
+        overwritten."""
+        if self.report is not None:
+            check_report(self.report)
+        check_free([*more, self.json, self.report], overwrite=self.force, inputs=inputs)
 
     @property
     def shows_all(self) -> bool:
@@ -113,15 +70,45 @@ class Results:
         self.leave(getattr(result, "findings", ()))
 
     def show(self, document: Document, sections: int | None = None) -> None:
-        """Print the first ``sections`` of a report, or all."""
-        show(document, self.json, sections=None if self.shows_all else sections)
+        """Print the first ``sections`` of a report, or all, unless stdout is for JSON."""
+        if not is_stdout(self.json):
+            from trihedron.report.text import to_text
+
+            chosen = None if self.shows_all else sections
+            put(to_text(with_arguments(document), sections=chosen, style=style()))
 
     def write(self, document: Document, machine: Machine, more: str = "") -> None:
         """Write report and JSON where requested; say ``more``, where more is found, unless all was shown."""
-        write_report(document, machine, self.report, force=self.force)
-        write_json(machine, self.json, force=self.force, document=document)
+        # A saved document keeps its own provenance.
+        document = document if document.provenance else with_provenance(with_arguments(document))
+        if self.report is not None:
+            from trihedron.report.saved import written
+
+            write_whole(self.report, written(document, machine, self.report), overwrite=self.force)
+            say(f"report: {self.report}")
+        self.write_json(machine, document)
         if more and not self.shows_all and self.report is None:
             say(more)
+
+    def write_json(self, machine: Machine, document: Document | None = None) -> None:
+        """Write the JSON to its file or ('-') stdout; a file includes the report, for ``trihedron report``.
+
+        Called after every other file is written, since the reader of stdout may have closed the pipe.
+        """
+        if self.json is None:
+            return
+        from trihedron.report.machine import json_text
+
+        if is_stdout(self.json):
+            typer.echo(json_text(machine()), nl=False)
+            return
+        content = machine()
+        if document is not None:
+            from trihedron.report.saved import with_report
+
+            content = with_report(content, document)
+        write_whole(self.json, json_text(content), overwrite=self.force)
+        say(f"JSON: {self.json}")
 
     def leave(self, findings: Iterable[Finding]) -> None:
         """As :func:`leave`, where the report was printed unless stdout is for JSON."""
@@ -138,14 +125,6 @@ class FullResults(Results):
     def shows_all(self) -> bool:
         """Whether the whole report is printed."""
         return self.full
-
-
-def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:
-    """Print the report on stdout, unless that is for JSON."""
-    if not is_stdout(json_target):
-        from trihedron.report.text import to_text
-
-        put(to_text(with_arguments(document), sections=sections, style=style()))
 
 
 def is_stdout(target: Path | None) -> bool:

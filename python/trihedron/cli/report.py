@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from trihedron.cli.options import with_options
-from trihedron.cli.output import check_outputs, show, write_report
+from trihedron.cli.output import Results
 from trihedron.cli.run import note_file
 from trihedron.documents import read_json
 from trihedron.errors import InputError
@@ -22,10 +22,11 @@ OPTIONS = {"result": typer.Argument(metavar="RESULT.json", help="A saved result,
 @with_options(OPTIONS)
 def report(result: Path, report: Path | None = None, force: bool = False) -> None:
     """Print a saved result again; --report FILE.html writes its page."""
-    check_outputs(force=force, report=report, inputs=[result])
+    results = Results(report=report, force=force)
+    results.check(inputs=[result])
     document, saved = _read(result)
-    show(document, None, sections=None)
-    write_report(document, lambda: saved, report, force=force)
+    results.show(document)
+    results.write(document, lambda: saved)
 
 
 def _read(path: Path) -> tuple[Document, dict[str, Any]]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from trihedron.cli.options import LogSource, ReadingOptions, with_options
-from trihedron.cli.output import check_outputs, leave, say, show, write_report
+from trihedron.cli.output import FullResults, Results, leave, say
 from trihedron.cli.run import name_log, note_file, with_commands
 
 if TYPE_CHECKING:
@@ -117,7 +117,8 @@ def simulate(
     if truth is not None:
         check_truth_suffix(truth)
     read_from = (None if scenario is None else Path(scenario), like, calibration)
-    check_outputs(output, truth, force=force, report=report, inputs=read_from)
+    results = FullResults(report=report, force=force)
+    results.check(output, truth, inputs=read_from)
     beside = ""
     findings: tuple[Finding, ...] = ()
     if like is not None and calibration is not None:
@@ -145,18 +146,18 @@ def simulate(
     from trihedron.report.simulation import simulation_report
 
     document = simulation_report(recording, known, beside, findings, "" if truth is None else str(truth))
-    write_report(document, lambda: truth_document(known), report, force=force)
+    results.write(document, lambda: truth_document(known))
     if serve is not None:
         serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
         return
     say(f"log: {output}")
-    show(document, None, sections=len(document.sections) - 1)
+    results.show(document, len(document.sections) - 1)
     leave(findings)
 
 
 def _write_template(path: Path, *, force: bool) -> None:
     from trihedron.files.scenario import TEMPLATE, write_scenario
 
-    check_outputs(path, force=force)
+    Results(force=force).check(path)
     write_scenario(TEMPLATE, path, overwrite=force)
     typer.echo(f"{path}: an ordinary sensor turned by hand; change what you know of yours.")

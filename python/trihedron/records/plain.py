@@ -78,10 +78,10 @@ def _converter() -> Converter:
         lambda entries, _: MappingProxyType({name: math.nan if one is None else one for name, one in entries.items()}),
     )
 
-    def of_mapping(entries: MappingProxyType[str, Any]) -> dict[str, Any]:
-        return {name: as_plain(one) if isinstance(one, Plain) else thawed(one) for name, one in entries.items()}
-
-    plain.register_unstructure_hook_func(_is_mapping, of_mapping)
+    plain.register_unstructure_hook_func(
+        _is_mapping,
+        lambda entries: {k: as_plain(one) if isinstance(one, Plain) else thawed(one) for k, one in entries.items()},
+    )
 
     def laid_out(kind: Any) -> Callable[[Any], dict[str, Any]]:
         layout: Layout = kind.LAYOUT

@@ -107,14 +107,11 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
         unit = f"{_unit(sensor)}/√Hz"
         x = np.concatenate([edges, np.full((len(edges), 1), np.nan)], axis=1).ravel()
-        lines = _both(x, np.repeat(model, 3), np.repeat(own, 3))
+        of_model = Line(x, np.repeat(model, 3), "model", "ink", is_dashed=True)
+        lines = Line(x, np.repeat(own, 3), "recording", "accent"), of_model
         scales = Scale("frequency [Hz]", "Hz", is_log=True), Scale(f"density [{unit}]", unit, is_log=True)
         panels.append(_panel(scales, lines, f"{_said(sensor)} {axis_in_print(axis)}"))
     return Chart(tuple(panels), columns=3)
-
-
-def _both(x: FloatArray, model: FloatArray, own: FloatArray) -> tuple[Line, Line]:
-    return (Line(x, own, "recording", "accent"), Line(x, model, "model", "ink", is_dashed=True))
 
 
 def _panel(scales: tuple[Scale, Scale], lines: tuple[Line, Line], title: str) -> Panel:

@@ -1,7 +1,7 @@
 """A given model compared with a recording: parameters and noise that differ, and prediction errors by stage."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from trihedron.arrays import TINY
 from trihedron.records.diagnosis import RELATIVE, Diagnosis, NoiseDifference, ParameterDifference, Stage
@@ -38,7 +38,7 @@ def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     """The parameters that differ as a table; likely mistakes, and noise that differs, as sentences."""
     differing = [p for p in diagnosis.parameters if p.significant]
     rows = tuple(map(_row, differing))
-    sentences = [*_remarks(differing), *differing_noise(diagnosis)]
+    sentences = [*dict.fromkeys(p.remark for p in differing if p.remark), *differing_noise(diagnosis)]
     if not rows and not sentences:
         return (Paragraph("None of the given parameters differs beyond both uncertainties and bias drift."),)
     blocks: list[Block] = []
@@ -47,10 +47,6 @@ def differing_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if sentences:
         blocks.append(Facts(tuple(("", one) for one in sentences)))
     return tuple(blocks)
-
-
-def _remarks(parameters: Iterable[ParameterDifference]) -> list[str]:
-    return list(dict.fromkeys(p.remark for p in parameters if p.remark))
 
 
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:

@@ -125,7 +125,9 @@ def _factor(value: Bounded, static: Bounded | None) -> str:
 
 
 def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
-    facts = [("for the filter", f"from {_beside(found)}{escaped(found.source)}{_of_static(found)}")]
+    # Without a reference the values are those of the log's rest.
+    part = "" if found.reference_source else "the longest static interval of "
+    facts = [("for the filter", f"from {part}{escaped(found.source)}{_of_static(found)}")]
     if any(one.static is not None for one in found.sensors):
         facts.append(("static", f"from {escaped(found.static_source) or OWN_REST}"))
     if found.reference_source:
@@ -152,11 +154,6 @@ def _facts(found: FilterNoise) -> tuple[tuple[str, str], ...]:
         is_limit = gyro is not None and gyro.static is not None and gyro.static.K.is_limit
         facts += _of_intervals(found.intervals, is_limit=is_limit)
     return tuple(facts)
-
-
-def _beside(found: FilterNoise) -> str:
-    """Where the values for the filter come from, of the log: its rest where there is no reference."""
-    return "" if found.reference_source else "the longest static interval of "
 
 
 def _of_static(found: FilterNoise) -> str:

@@ -80,10 +80,6 @@ def _meaning(seen: Consistency) -> str:
     return "as predicted"
 
 
-def _limits(seen: Consistency) -> str:
-    return f"{plain_number(seen.nis_low)} to {plain_number(seen.nis_high)}"
-
-
 def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> list[Section]:
     facts = (
         ("poses", f"{outcome.n_poses} in known attitudes"),
@@ -136,14 +132,14 @@ def _constants_table(axis: AxisKalmanResult, raw_unit: str) -> Table:
 
 
 def _consistency_table(seen: list[tuple[str, Consistency, int]]) -> Table:
-    rows = tuple(
-        (name, f"{c.n} of {n}", plain_number(c.nis_mean), _limits(c), plain_number(c.whiteness_p, 2))
-        for name, c, n in seen
-    )
+    rows = []
+    for name, c, n in seen:
+        limits = f"{plain_number(c.nis_low)} to {plain_number(c.nis_high)}"
+        rows.append((name, f"{c.n} of {n}", plain_number(c.nis_mean), limits, plain_number(c.whiteness_p, 2)))
     head = ("axis", "poses judged", "mean NIS", "99 % when right", "whiteness, p")
     caption = "NIS: innovations squared over their predicted variance; Ljung-Box test of whiteness. The first poses "
     caption += "only start the filter, which predicts nothing yet"
-    return Table(head, rows, caption)
+    return Table(head, tuple(rows), caption)
 
 
 def _pose_table(outcome: KalmanCalibration) -> Table:

@@ -28,10 +28,6 @@ SHAPES = 0.1
 """Relative model error of a density: lines and sharper filters are not represented by two terms and a low-pass."""
 
 
-def _filters(dt: float) -> list[Smoother]:
-    return [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
-
-
 FEWEST_BELOW = 4
 """Number of octaves starting below the corner from which on only these are fitted for N and B."""
 
@@ -72,7 +68,8 @@ def noise_of_octaves(
 
     if low_pass is None or low_pass.corner_hz > 0.0:
         # The detected filter and those tried: where noisy poses determined its corner, a typical one has another.
-        filters = [*_filters(dt), *([] if low_pass is None else [low_pass])]
+        filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
+        filters += [] if low_pass is None else [low_pass]
         misfits = [fitted(one)[1] for one in filters]
         best = int(np.argmin(misfits))
         low_pass = filters[best if low_pass is not None or misfits[0] - misfits[best] > FILTER_EARNS else 0]
