@@ -218,7 +218,6 @@ def test_equations_that_the_code_cites_are_in_the_documents():
 # Records that only stages make: what does not fit together there is a defect, to be seen with its trace.
 DEFECTS = {
     "records/calibration.py",
-    "records/allan_curve.py",
     "records/segments.py",
     "report/findings/wording.py",
     "cli/allan.py",  # caught one line below

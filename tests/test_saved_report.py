@@ -19,12 +19,11 @@ from trihedron.errors import InputError
 from trihedron.records import Finding, Severity
 from trihedron.records.domains import DOMAINS
 from trihedron.report.calibration_charts import uncalibrated_error
-from trihedron.report.chart import Bars, Chart, Level, Line, Panel, Points, Scale, Span
+from trihedron.report.chart import Bars, Chart, Level, Line, Panel, Points, Scale, Span, ticks
 from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import combined, findings_block
 from trihedron.report.findings.wording import filled
-from trihedron.report.layout import ticks
 from trihedron.report.machine import json_text
 from trihedron.report.numbers import unit_with_power, with_sigma_and_power
 from trihedron.report.page import to_html

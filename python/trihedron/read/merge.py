@@ -113,7 +113,6 @@ def _on_clock_of(base: Sensors, other: Sensors, where: str) -> tuple[Sensors, Fi
         has_lost=n_lost > 0,
         lost_rows=n_lost,
         is_resampled=variance < FAITHFUL or rate[name] < rate[own] / FASTER,
-        rate_ratio=rate["gyroscope"] / rate["accelerometer"],
         rows_left_out=len(base_t) - len(kept_t) + n_beyond,
     )
     readings: dict[str, Any] = {own: kept_v, name: brought}

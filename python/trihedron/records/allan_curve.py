@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.errors import InputError
-from trihedron.records.frozen import Frozen, freeze
+from trihedron.records.frozen import Frozen
 
 AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 
@@ -54,15 +54,6 @@ class AllanCurve(Frozen):
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     stride: int = 1
-
-    def __post_init__(self) -> None:
-        shape = (len(self.clusters), *self.deviation.shape[1:])
-        if len(shape) > 2:
-            raise ValueError(f"deviation must have shape (k,) or (k, channels), got {self.deviation.shape}")
-        for name in _PER_CHANNEL:
-            if getattr(self, name).shape != shape:
-                raise ValueError(f"{name} must have shape {shape}, got {getattr(self, name).shape}")
-        freeze(self)
 
     @property
     def tau_s(self) -> FloatArray:

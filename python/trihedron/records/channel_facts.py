@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -83,14 +83,6 @@ class ChannelFacts(Frozen):
                 out[first:stop, limit.axis] = True
         return out
 
-    def moved(self, to: IntArray) -> ChannelFacts:
-        """The same for a log with samples inserted: ``to`` (n,) are the new indices of its own samples."""
-        limits = tuple(
-            replace(limit, runs=np.stack([to[limit.runs[:, 0]], to[limit.runs[:, 1] - 1] + 1], axis=1))
-            for limit in self.limits
-        )
-        return replace(self, limits=limits)
-
     def adc_range(self, readings: FloatArray) -> tuple[float, float] | None:
         """Lowest and highest code of one ADC behind all three channels of ``readings`` (n, 3).
 
@@ -130,10 +122,6 @@ class RecordingFacts(Frozen):
     def steps(self) -> FloatArray:
         """(3,) or (6,) resolutions of all channels present, the accelerometer's first."""
         return np.concatenate([one.step for one in (self.accelerometer, self.gyroscope) if one is not None])
-
-    def moved(self, to: IntArray) -> RecordingFacts:
-        """The same for a log with samples inserted (:meth:`ChannelFacts.moved`)."""
-        return RecordingFacts(*(one and one.moved(to) for one in (self.accelerometer, self.gyroscope)))
 
     def of(self, sensor: str) -> ChannelFacts:
         """The channel properties of one sensor. Raises ``InputError`` when the recording lacks that sensor."""

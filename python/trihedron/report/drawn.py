@@ -7,8 +7,21 @@ from html import escape
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.report.chart import Band, Bars, Chart, Level, Line, Mark, Panel, Points, Span, limits_of
-from trihedron.report.layout import UNITS, Places, ticks
+from trihedron.report.chart import (
+    UNITS,
+    Band,
+    Bars,
+    Chart,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    Places,
+    Points,
+    Span,
+    limits_of,
+    ticks,
+)
 from trihedron.report.numbers import plain_number, with_sigma
 
 COARSE = 10

@@ -22,10 +22,6 @@ class Figures:
         """N and K of the accelerometer, N and K of the gyro."""
         return self.accel_N, self.accel_K, self.gyro_N, self.gyro_K
 
-    def of(self, sensor: str) -> tuple[NoiseFigure, NoiseFigure]:
-        """N and K of a sensor."""
-        return (self.accel_N, self.accel_K) if sensor == "accelerometer" else (self.gyro_N, self.gyro_K)
-
 
 def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
     """The noise and rate that the target's reader requires.
