@@ -79,13 +79,14 @@ def _spoilt(diagnosis: Diagnosis) -> Finding | None:
     effects = [effect.id for effect in diagnosis.effects]
     gyro, covariance = diagnosis.extended.gyroscope, diagnosis.extended.covariance
     if gyro is not None and covariance is not None and np.diag(covariance)[12:21].max() > np.square(gyro["S"]).max():
-        return Finding.of("effects-modelled", "undetermined", effects=effects)
+        return Finding.of("effects-modelled", "undetermined", effects=effects, n_effects=len(effects))
     for before, after in diagnosis.predicted:
         if after.rms > MAY_RISE * before.rms:
             return Finding.of(
                 "effects-modelled",
                 "stays-linear",
                 effects=effects,
+                n_effects=len(effects),
                 domain=before.domain,
                 rms_before=before.rms,
                 rms_after=after.rms,
@@ -163,4 +164,6 @@ def _modelled(diagnosis: Diagnosis) -> Finding:
         is_fitted=bool(diagnosis.effects),
         left=left,
         is_left=bool(left),
+        n_effects=len(diagnosis.effects),
+        n_domains_left=len(left),
     )
