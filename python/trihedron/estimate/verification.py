@@ -1,7 +1,7 @@
 """A calibration against another recording: gravity error in static poses, tilt error after rotations, static rate."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -63,9 +63,8 @@ def verify_calibration(
     accelerometer = calibration.accelerometer
     noise = _variance(segments.norm_sigma, segments.n_poses)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
-    empty = np.zeros(0)
-    moves = Carriage(empty, empty, empty, np.zeros(0, dtype=np.int64), ())
     gyroscope, measured = calibration.gyroscope, None
+    angle_deg = angle_noise_deg = angle_sigma_deg = np.zeros(0)
     force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
     rest, rest_noise = static_rate(gyroscope, segments)
     rest_sigma = expected_change(calibration, recording, segments, rest_noise)
@@ -75,15 +74,17 @@ def verify_calibration(
         rest_sigma = np.sqrt(rest_sigma**2 + np.einsum("nii->ni", earth))
         if any(move.stop - move.start >= 2 for move in segments.moves):
             measured = without_g_sensitivity(measure_moves(recording, segments, accelerometer), own)
-            moves = _carried(calibration, gyroscope, measured, segments)
+            angle_deg, angle_noise_deg, angle_sigma_deg = _carried(calibration, gyroscope, measured, segments)
+    lost = np.zeros(0, dtype=np.bool_) if measured is None else measured.is_lost
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
     changed = _changed(parameters)
     judged = (calibration, without, measured, segments)
-    worse = _worse_than_none(*judged, gravity_m_s2, (error, moves.angle_deg), changed)
+    worse = _worse_than_none(*judged, gravity_m_s2, (error, angle_deg), changed)
     of_poses = _norm_findings(error, error_sigma, gravity_m_s2, changed)
     of_rates = tuple(rate_findings(rest, rest_sigma, own, FAR_BEYOND))
-    beyond_noise = (*of_poses, *_angle_findings(moves, changed, segments))
+    of_moves = _angle_findings(angle_deg, angle_sigma_deg, np.flatnonzero(~lost), changed, segments)
+    beyond_noise = (*of_poses, *of_moves)
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -93,13 +94,13 @@ def verify_calibration(
         norm_error=error,
         norm_noise=error_noise,
         norm_sigma=error_sigma,
-        angle_deg=moves.angle_deg,
-        angle_noise_deg=moves.noise_deg,
-        angle_sigma_deg=moves.sigma_deg,
+        angle_deg=angle_deg,
+        angle_noise_deg=angle_noise_deg,
+        angle_sigma_deg=angle_sigma_deg,
         static_rate=rest,
         static_rate_sigma=rest_sigma,
-        moves=moves.which,
-        moves_left_out=moves.left_out,
+        moves=np.flatnonzero(~lost),
+        moves_left_out=tuple(np.flatnonzero(lost).tolist()),
         parameters=parameters,
         findings=(
             *beyond_noise,
@@ -108,7 +109,7 @@ def verify_calibration(
             *bias_findings(gyroscope, rest, FAR_BEYOND, is_alone=not beyond_noise),
             *shift_findings(parameters),
             *_untested(calibration, own, segments),
-            *(() if beyond_noise else imprecision_findings(error, moves.angle_deg, own)),
+            *(() if beyond_noise else imprecision_findings(error, angle_deg, own)),
         ),
     )
 
@@ -162,7 +163,7 @@ def _worse_than_none(
     gyroscope = without.gyroscope
     if gyroscope is not None and measured is not None:
         with_it = replace(calibration, gyroscope=gyroscope)
-        pairs["moves"] = (angle, _carried(with_it, gyroscope, measured, segments).angle_deg)
+        pairs["moves"] = (angle, _carried(with_it, gyroscope, measured, segments)[0])
     return [
         Finding.of(
             "worse-than-uncalibrated",
@@ -212,30 +213,18 @@ def _variance(sigma: FloatArray | None, n: int) -> FloatArray:
     return np.zeros((n, 3)) if sigma is None else np.asarray(sigma) ** 2
 
 
-@dataclass(frozen=True, eq=False)
-class Carriage:
-    """Tilt errors (m,) [deg] after rotations, their noise, and noise with the calibration's uncertainty;
-    ``which`` (m,) and ``left_out`` are the indices of these moves and of the excluded ones."""
-
-    angle_deg: FloatArray
-    noise_deg: FloatArray
-    sigma_deg: FloatArray
-    which: IntArray
-    left_out: tuple[int, ...]
-
-
 def _carried(
     calibration: Calibration, gyroscope: SensorCalibration, measured: MoveMeasurements, segments: Segments
-) -> Carriage:
-    """Tilt errors after rotations as in a calibration's report (docs/model-session.md): S of the calibration, a bias
-    per pose, without moves that were at the gyro's range limit for long."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Tilt errors (m,) [deg] after rotations as in a calibration's report (docs/model-session.md), their noise, and
+    noise with the calibration's uncertainty: S of the calibration, a bias per pose, without moves that were at the
+    gyro's range limit for long."""
     seen = carried_by(calibration, gyroscope.S, measured, segments)
-    told = np.flatnonzero(~measured.is_lost)
-    g = calibration.gravity_m_s2
+    told = ~measured.is_lost
     by_calibration2 = seen.by_calibration2(calibration.covariance)
-    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + by_calibration2)[told]) / g
-    left_out = tuple(np.flatnonzero(measured.is_lost).tolist())
-    return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
+    variances = seen.floor2, seen.floor2 + by_calibration2
+    noise, total = (np.degrees(np.sqrt(of[told]) / calibration.gravity_m_s2) for of in variances)
+    return seen.angle_deg[told], noise, total
 
 
 def _norm_findings(error: FloatArray, sigma: FloatArray, gravity_m_s2: float, changed: _Changed) -> Iterator[Finding]:
@@ -286,8 +275,10 @@ def _beyond(z2: FloatArray, n_components: int) -> _Beyond | None:
     return _Beyond(times, times > FAR_BEYOND, others > probability.FALSE_ALARM)
 
 
-def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> Iterator[Finding]:
-    angle_deg, sigma_deg = moves.angle_deg, moves.sigma_deg
+def _angle_findings(
+    angle_deg: FloatArray, sigma_deg: FloatArray, which: IntArray, changed: _Changed, segments: Segments
+) -> Iterator[Finding]:
+    """Finding where tilt errors (m,) after the moves ``which`` (m,) exceed what is expected."""
     if not len(angle_deg):
         return
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
@@ -295,7 +286,7 @@ def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> I
     if beyond is None:
         return
     worst = int(np.argmax(angle_deg / sigma_deg))
-    move = segments.moves[moves.which[worst]]
+    move = segments.moves[which[worst]]
     unsteady = [k + 1 for k in (move.pose_before, move.pose_after) if segments.poses[k].is_unsteady]
     yield Finding.of(
         "held-out-worse",
@@ -304,7 +295,7 @@ def _angle_findings(moves: Carriage, changed: _Changed, segments: Segments) -> I
         is_bias=changed.is_bias,
         is_few=changed.is_few,
         shifted=changed.shifted,
-        worst_move=int(moves.which[worst]) + 1,
+        worst_move=int(which[worst]) + 1,
         worst_deg=angle_deg[worst],
         is_common=changed.gyro_factor is not None,
         common=changed.gyro_factor or 0.0,
