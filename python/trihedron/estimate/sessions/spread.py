@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 
-from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
+from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.probability import chdtri, ndtri, stdtrit
 from trihedron.records.sessions import PARAMETERS, Repeated, Session, Spread
@@ -78,11 +78,9 @@ def spread_within(values: FloatArray, variances: FloatArray, groups: Sequence[ob
 
     ``variances`` (n,) are those of the sessions' own errors.
     """
-    members = _members(groups)
-    dof = sum(len(group) - 1 for group in members)
-    if dof < 1:
-        return None
-    return _spread(*_padded(values, variances, members), dof)
+    order, starts = _grouped(groups)
+    dof = len(order) - len(starts)
+    return _spread(values[order], variances[order], starts, dof) if dof > 0 else None
 
 
 def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[object]) -> Spread | None:
@@ -91,25 +89,19 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
     With one session per group, σ_d and σ_u are not separable: :func:`spread_within` with all sessions in one group
     estimates both together.
     """
-    members = _members(groups)
-    dof_within = sum(len(group) - 1 for group in members)
-    if len(members) < 2 or dof_within < 1:
+    within = spread_within(values, variances, groups)
+    order, starts = _grouped(groups)
+    dof = len(starts) - 1
+    if within is None or dof < 1:
         return None
-    within = _spread(*_padded(values, variances, members), dof_within)
-    dof = len(members) - 1
-    one_group = [np.arange(len(members))]
+    y, v = values[order], variances[order]
     points = (np.arange(QUANTILES) + 0.5) / QUANTILES
-    inner = _solved(*_padded(values, variances, members), _chi_square(points, dof_within))
-    targets = _chi_square(points, dof)
-    at_each = [_group_means(values, variances, members, s2) for s2 in inner]
-    level, own = (np.array(one)[:, None, :] for one in zip(*at_each, strict=True))
-    draws = _solved(level, own, np.ones((1, len(members)), dtype=bool), targets)
+    inner = _solved(y, v, starts, _chi_square(points, within.dof))
+    draws = _solved(*_group_means(y, v, starts, inner[:, None]), ONE_GROUP, _chi_square(points, dof))
     ends = np.sqrt(np.quantile(draws, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
-    means = _padded(*_group_means(values, variances, members, within.sd**2), one_group)
-    point = float(np.sqrt(_solved(*means, np.array([float(dof)]))[0]))
-    if ends[1] == 0.0:
-        ends[1] = _spread(*means, dof).high
-    return Spread(float(np.clip(point, *ends)), float(ends[0]), float(ends[1]), dof)
+    means = _spread(*_group_means(y, v, starts, within.sd**2), ONE_GROUP, dof)
+    high = float(ends[1]) or means.high
+    return Spread(float(np.clip(means.sd, ends[0], high)), float(ends[0]), high, dof)
 
 
 def spread_of_next(spread: Spread | None) -> float:
@@ -138,11 +130,11 @@ def common_mean(
         value = float(np.average(values, weights=1.0 / variances))
         std = float(np.sqrt(1.0 / np.sum(1.0 / variances)))
         return value, std, -stdtrit(max(len(values), 2), 0.5 - LEVEL / 2.0) * std
-    members = _members(groups)
     if between is None:
         level, variance = values, variances + within.sd**2
     else:
-        level, variance = _group_means(values, variances, members, within.sd**2)
+        order, starts = _grouped(groups)
+        level, variance = _group_means(values[order], variances[order], starts, within.sd**2)
         variance = variance + between.sd**2
     weights = 1.0 / variance
     value = float(np.average(level, weights=weights))
@@ -163,62 +155,55 @@ def _exceeded(above: float, dof: int) -> float:
     return chdtri(dof, above)
 
 
-def _members(groups: Sequence[object]) -> list[IntArray]:
-    names = list(dict.fromkeys(groups))
-    return [np.array([k for k, group in enumerate(groups) if group == name], dtype=np.int64) for name in names]
+ONE_GROUP = np.zeros(1, dtype=np.int64)
+"""Where the only group begins."""
 
 
-def _spread(y: FloatArray, v: FloatArray, is_there: BoolArray, dof: int) -> Spread:
-    """Spread of values and variances by group: σ at which Q is its mean (Paule and Mandel 1982), and its interval."""
+def _grouped(groups: Sequence[object]) -> tuple[IntArray, IntArray]:
+    """Order (n,) that brings the sessions of a group together, and where in it the groups (g,) begin."""
+    names = {group: number for number, group in enumerate(dict.fromkeys(groups))}
+    number = np.array([names[group] for group in groups])
+    return np.argsort(number, kind="stable"), np.append(0, np.cumsum(np.bincount(number))[:-1])
+
+
+def _spread(y: FloatArray, v: FloatArray, starts: IntArray, dof: int) -> Spread:
+    """Spread of values and variances (n,) by group: σ at which Q is its mean (Paule and Mandel 1982), its interval."""
     tail = 0.5 - LEVEL / 2.0
     targets = np.append(_chi_square([tail, 1.0 - tail], dof), dof)
-    low, high, point = np.sqrt(_solved(y, v, is_there, targets))
+    low, high, point = np.sqrt(_solved(y, v, starts, targets))
     if high == 0.0:
         # Sessions agree better than their uncertainties allow: these are reduced for the upper limit, which is not 0.
-        q = float(_q(y, v, is_there, np.zeros(1))[0])
-        high = float(np.sqrt(_solved(y, v * max(q / dof, 1e-6), is_there, targets[1:2])[0]))
+        q = float(_q(y, v, starts, np.zeros(1))[0])
+        high = float(np.sqrt(_solved(y, v * max(q / dof, 1e-6), starts, targets[1:2])[0]))
     return Spread(float(point), float(low), float(high), dof)
 
 
-def _q(y: FloatArray, v: FloatArray, is_there: BoolArray, s2: FloatArray) -> FloatArray:
-    """Q (..., m) of equation (1) at every σ² (..., m), of values and variances (..., g, most) by group."""
-    weights = np.where(is_there, 1.0 / (v[..., None, :, :] + s2[..., None, None]), 0.0)
-    mean = (weights * y[..., None, :, :]).sum(axis=-1) / weights.sum(axis=-1)
-    return np.asarray((weights * (y[..., None, :, :] - mean[..., None]) ** 2).sum(axis=(-1, -2)))
+def _q(y: FloatArray, v: FloatArray, starts: IntArray, s2: FloatArray) -> FloatArray:
+    """Q (..., m) of equation (1) at every σ² (..., m), of values and variances (..., n) in groups."""
+    y, v = y[..., None, :], v[..., None, :] + s2[..., None]
+    mean, _ = _group_means(y, v, starts)
+    away = y - np.repeat(mean, np.diff(starts, append=y.shape[-1]), axis=-1)
+    return np.asarray((away**2 / v).sum(axis=-1))
 
 
-def _padded(
-    values: FloatArray, variances: FloatArray, members: list[IntArray]
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Values, variances and their mask, one group a row (g, most): the sums over all groups are vectorised."""
-    size = np.array([len(group) for group in members])
-    is_there = np.arange(size.max()) < size[:, None]
-    y, v = np.zeros(is_there.shape), np.ones(is_there.shape)
-    together = np.concatenate(members)
-    y[is_there], v[is_there] = values[together], variances[together]
-    return y, v, is_there
-
-
-def _solved(y: FloatArray, v: FloatArray, is_there: BoolArray, targets: FloatArray) -> FloatArray:
+def _solved(y: FloatArray, v: FloatArray, starts: IntArray, targets: FloatArray) -> FloatArray:
     """σ² (..., m) at which Q, which decreases with σ², equals each target (m,); 0 where Q(0) is below it."""
-    centre = np.sum(y, axis=-1, where=is_there) / is_there.sum(axis=-1)
-    squares = np.sum((y - centre[..., None]) ** 2, axis=(-1, -2), where=is_there)
+    squares = _q(y, np.zeros_like(v), starts, np.ones(1))
     scale = max(float(squares.max()), float(v.max()), TINY)
-    shape = (*y.shape[:-2], len(targets))
+    shape = (*y.shape[:-1], len(targets))
     low, high = np.full(shape, np.log(1e-12 * scale)), np.full(shape, np.log(1e6 * scale))
-    is_zero = _q(y, v, is_there, np.exp(low)) <= targets
+    is_zero = _q(y, v, starts, np.exp(low)) <= targets
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        above = _q(y, v, is_there, np.exp(middle)) > targets
+        above = _q(y, v, starts, np.exp(middle)) > targets
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
 
 
 def _group_means(
-    values: FloatArray, variances: FloatArray, members: list[IntArray], s2: float
+    y: FloatArray, v: FloatArray, starts: IntArray, s2: FloatArray | float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Weighted mean (g,) of every group and its variance (g,), at a given σ_u²."""
-    y, v, is_there = _padded(values, variances, members)
-    weights = np.where(is_there, 1.0 / (v + s2), 0.0)
-    total = weights.sum(axis=1)
-    return (weights * y).sum(axis=1) / total, 1.0 / total
+    """Weighted mean (..., g) of every group and its variance, at a given σ_u²."""
+    weights = 1.0 / (v + s2)
+    total = np.add.reduceat(weights, starts, axis=-1)
+    return np.asarray(np.add.reduceat(weights * y, starts, axis=-1) / total), 1.0 / total
