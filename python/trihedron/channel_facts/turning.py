@@ -7,13 +7,13 @@ contribute. No calibration is needed; the body's own acceleration averages out.
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
+from trihedron.transforms import cross_matrix
 from trihedron.units import RateUnit, rate_to_si
 
 USUAL = (RateUnit.RAD_S, RateUnit.DEG_S)
@@ -144,63 +144,37 @@ def turns_with(gravity: FloatArray, rates: FloatArray, rate_hz: float) -> bool:
     return turning is not None and turning.correlation > CLEAR_CORRELATION and turning.n >= FEWEST_PAIRS
 
 
-@dataclass(frozen=True)
-class _Sums:
-    """Normal matrix (9, 9), right side (9,) and sum of squares for gravity's change on rates; number of blocks."""
-
-    normal: FloatArray
-    right: FloatArray
-    total: float
-    n: int
-
-    def on(self, axes: FloatArray) -> Turning | None:
-        """Scale and correlation for the orientation ``axes`` (3, 3) of the gyro in the accelerometer's frame."""
-        c = axes.ravel()
-        predicted, shared = float(c @ self.normal @ c), float(c @ self.right)
-        if not (predicted > 0.0 and shared > 0.0 and self.total > 0.0):
-            return None
-        correlation, scale = min(shared / math.sqrt(predicted * self.total), 1.0), shared / predicted
-        spread = math.sqrt((1.0 - correlation**2) / max(self.n - 1, 1)) / correlation
-        return Turning(scale, scale * spread, correlation, self.n)
-
-    def best(self, orientations: Sequence[FloatArray]) -> tuple[Turning, FloatArray] | None:
-        """The orientation with the highest correlation, and its scale."""
-        tried = [(found, axes) for axes in orientations if (found := self.on(axes)) is not None]
-        return max(tried, key=lambda pair: pair[0].correlation) if tried else None
-
-
-def _sums(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> _Sums:
-    """Sums of directions a (n, 3), rates w (n, 3) [unit] and changes (n, 3) over blocks of ``step_s`` [s]."""
-    cross = np.zeros((len(a), 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
-    cross -= cross.transpose(0, 2, 1)
-    design = (step_s * cross[:, :, :, None] * w[:, None, None, :]).reshape(-1, 9)
-    return _Sums(design.T @ design, design.T @ seen.ravel(), float(np.sum(seen**2)), len(a))
-
-
 def _fitted(
     a: FloatArray, w: FloatArray, seen: FloatArray, starts: IntArray, is_noise: BoolArray, step_s: float
 ) -> Turning | None:
     """The scale from directions, rates and changes (n, 3) of blocks; ``starts`` are the first ones of each move."""
-    whole = _sums(a, w, seen, step_s)
-    if not np.isfinite(whole.normal).all() or not whole.normal.any():
+    design = (step_s * cross_matrix(a)[:, :, :, None] * w[:, None, None, :]).reshape(-1, 9)
+    normal, right, total = design.T @ design, design.T @ seen.ravel(), float(np.sum(seen**2))
+    if not np.isfinite(normal).all() or not normal.any():
         return None
-    values, vectors = np.linalg.eigh(whole.normal)
+    values, vectors = np.linalg.eigh(normal)
     kept = values > 0.01 * values[-1]
-    u, _, vt = np.linalg.svd((vectors[:, kept] @ ((vectors[:, kept].T @ whole.right) / values[kept])).reshape(3, 3))
-    found = whole.best((*_SIGNED_AXES, u @ vt))
-    if found is None:
+    u, _, vt = np.linalg.svd((vectors[:, kept] @ ((vectors[:, kept].T @ right) / values[kept])).reshape(3, 3))
+    # Orientations of the gyro in the accelerometer's frame, the likeliest by the correlation of gravity's change.
+    tried = np.array([*_SIGNED_AXES, u @ vt]).reshape(-1, 9)
+    power, shared = np.einsum("ki,ij,kj->k", tried, normal, tried), tried @ right
+    seen_alike = np.where(power > 0.0, shared / np.sqrt(np.maximum(power * total, TINY)), 0.0)
+    best = int(np.argmax(seen_alike))
+    correlation, scale = min(float(seen_alike[best]), 1.0), float(shared[best] / max(power[best], TINY))
+    if not correlation > 0.0:
         return None
-    turning, axes = found
+    axes, sigma = (
+        tried[best].reshape(3, 3),
+        scale * math.sqrt((1.0 - correlation**2) / max(len(a) - 1, 1)) / correlation,
+    )
     predicted = step_s * np.cross(a, w @ axes.T)
-    left = seen - turning.scale * predicted
+    left = seen - scale * predicted
     power, along = (np.add.reduceat(np.sum(predicted * other, axis=1), starts) for other in (predicted, seen))
     # Jackknife: what one move alone determines, the others do not confirm.
     without = (along.sum() - along) / np.maximum(power.sum() - power, TINY)
     spread = float(np.std(without) * math.sqrt(len(power) - 1))
-    turning = replace(turning, sigma=max(turning.sigma, spread))
     still = [k for k in range(3) if is_noise[k] and len(a) >= _FEWEST and _turns_about(axes[:, k], a, left)]
-    return replace(turning, motionless=tuple(still))
+    return Turning(scale, max(sigma, spread), correlation, len(a), tuple(still))
 
 
 def _turns_about(axis: FloatArray, a: FloatArray, left: FloatArray) -> bool:
