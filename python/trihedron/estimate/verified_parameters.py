@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import FloatArray, rms_of
+from trihedron.arrays import FloatArray, rms_of, sigmas_of
 from trihedron.estimate.sessions.changes import DRIFT_DOF, bias_drift
-from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
+from trihedron.estimate.sessions.numbers import numbers_with_covariance
+from trihedron.invariants import Anchor, anchor_of, invariants
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.records.diagnosis import RELATIVE
 from trihedron.records.sessions import PARAMETERS
@@ -30,14 +31,15 @@ def judge_parameters(known: Calibration, own: Calibration | None, segments: Segm
     then judged, always by the mean of the poses. The log's uncertainty of a bias includes twice its drift between
     sessions (eq. 9.3), as in ``diagnose``: the file does not contain that of its own session.
     """
-    numbers, sigma, anchor = _numbers(known)
-    n = len(numbers)
+    numbers, covariance, anchor = numbers_with_covariance(known)
+    n, sigma = len(numbers), sigmas_of(covariance)
     other, other_sigma = np.full(n, np.nan), np.full(n, np.inf)
-    if own is not None and (own.gyroscope is not None) == (known.gyroscope is not None):
-        other, other_sigma, _ = _numbers(own, anchor)
-    elif own is not None:
-        alone = replace(own, gyroscope=None, covariance=own.covariance[:12, :12])
-        other[:9], other_sigma[:9], _ = _numbers(alone, Anchor(anchor.signs, None))
+    if own is not None:
+        if (own.gyroscope is None) != (known.gyroscope is None):
+            # Of one that only one side has nothing is compared.
+            own, anchor = replace(own, gyroscope=None, covariance=own.covariance[:12, :12]), Anchor(anchor.signs, None)
+        seen, covariance, _ = numbers_with_covariance(own, anchor)
+        other[: len(seen)], other_sigma[: len(seen)] = seen, sigmas_of(covariance)
     if n > 9 and known.gyroscope is not None and segments.gyroscope_mean is not None:
         other[9:12], other_sigma[9:12] = _resting(known.gyroscope, segments.gyroscope_mean)
     drift = bias_drift(known if own is None else own, segments, n)
@@ -143,17 +145,6 @@ def uncalibrated(known: Calibration, own: Calibration | None, recording: Recordi
         covariance=np.zeros((n, n)),
         frame="case",
     )
-
-
-def _numbers(calibration: Calibration, anchor: Anchor | None = None) -> tuple[FloatArray, FloatArray, Anchor]:
-    """Frame-independent parameters (9,) or (18,), their standard uncertainties, and the anchor they refer to."""
-    lower = in_frame(calibration, "lower")
-    accel, gyro = lower.accelerometer, lower.gyroscope
-    S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
-    anchor = anchor or anchor_of(accel.S, S_g)
-    J = numbers_jacobian(accel.S, accel.b, S_g, b_g)
-    variance = np.einsum("ij,jk,ik->i", J, lower.covariance, J)
-    return numbers_of(accel.S, accel.b, S_g, b_g, anchor), np.sqrt(np.maximum(variance, 0.0)), anchor
 
 
 def _resting(gyroscope: SensorCalibration, means: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -85,13 +85,11 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
 def _row(result: Any) -> Row:
     from trihedron.estimate.sessions.numbers import session_of
     from trihedron.files.calibration import calibration_document
-    from trihedron.invariants import anchor_of
     from trihedron.sensor_model import in_frame
 
     calibration = in_frame(result.calibration, "lower")
     accel, gyro = calibration.accelerometer, calibration.gyroscope
-    anchor = anchor_of(accel.S, None if gyro is None else gyro.S)
-    session = session_of(result, anchor, result.recording.source, "")
+    session = session_of(result, None, result.recording.source, "")
     quality = accel.quality
     return {
         "sha256": result.recording.sha256,

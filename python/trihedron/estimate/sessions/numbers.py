@@ -5,9 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.sessions.changes import bias_drift
 from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
-from trihedron.records import SensorCalibration
+from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.recording import distinct_names
 from trihedron.records.results import CalibrationResult
 from trihedron.records.sessions import Session
@@ -20,35 +21,43 @@ resolution of 0.1 to 0.5 °C."""
 
 def sessions_of(results: Sequence[CalibrationResult], groups: Sequence[str]) -> tuple[Session, ...]:
     """Calibrations as frame-independent parameters, relative to the axes of the first one."""
-    first = in_frame(results[0].calibration, "lower")
-    anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
+    *_, anchor = numbers_with_covariance(results[0].calibration)
     names = distinct_names([result.recording.source for result in results])
     return tuple(
         session_of(result, anchor, name, group) for result, name, group in zip(results, names, groups, strict=True)
     )
 
 
-def session_of(result: CalibrationResult, anchor: Anchor, name: str, group: str) -> Session:
-    """One calibration as parameters with their covariance."""
-    calibration = in_frame(result.calibration, "lower")
-    accel, gyro = calibration.accelerometer, calibration.gyroscope
+def numbers_with_covariance(
+    calibration: Calibration, anchor: Anchor | None = None
+) -> tuple[FloatArray, FloatArray, Anchor]:
+    """Frame-independent parameters (n,), their covariance (n, n), and their anchor, by default its own."""
+    lower = in_frame(calibration, "lower")
+    accel, gyro = lower.accelerometer, lower.gyroscope
     S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
+    anchor = anchor or anchor_of(accel.S, S_g)
     jacobian = numbers_jacobian(accel.S, accel.b, S_g, b_g)
-    covariance = jacobian @ calibration.covariance @ jacobian.T
-    recording = result.recording
+    covariance = jacobian @ lower.covariance @ jacobian.T
+    return numbers_of(accel.S, accel.b, S_g, b_g, anchor), 0.5 * (covariance + covariance.T), anchor
+
+
+def session_of(result: CalibrationResult, anchor: Anchor | None, name: str, group: str) -> Session:
+    """One calibration as parameters with their covariance."""
+    numbers, covariance, _ = numbers_with_covariance(result.calibration, anchor)
+    calibration, recording = in_frame(result.calibration, "lower"), result.recording
     temperature, low, high, branch = _temperature(result)
     return Session(
         name,
         group,
-        numbers_of(accel.S, accel.b, S_g, b_g, anchor),
-        0.5 * (covariance + covariance.T),
+        numbers,
+        covariance,
         bias_drift(calibration, result.segments, len(covariance)),
         recording.start_epoch_s,
         temperature,
         (low, high),
         branch,
         recording.sha256,
-        *_gravity_error(accel),
+        *_gravity_error(calibration.accelerometer),
     )
 
 
