@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron._core import integrate_raw_rate
-from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray, rms_of
+from trihedron.arrays import BoolArray, FloatArray, IntArray, rms_of
 from trihedron.errors import InputError
 from trihedron.estimate.gyroscope.biases import pool_biases
 from trihedron.estimate.gyroscope.measurements import rate_noise_density
@@ -265,23 +265,16 @@ def other_sense(is_reversed: BoolArray, angles: FloatArray) -> InputError:
 
 
 def scale_of_stated(turns: TableTurns) -> FloatArray | None:
-    """Scale (3, 3), rad/s per raw unit, by a robust fit to turns; ``None`` where they do not span three axes.
+    """Scale (3, 3), rad/s per raw unit, near that of the turns; ``None`` where they do not span three axes.
 
-    Least absolute deviations (reweighted least squares) of ``φ'_i - z̄ Δt_i = S_w φ_i``.
+    Least squares of ``φ'_i - z̄ Δt_i = S_w φ_i``, relative to each angle; a wrong turn is found by the session.
     """
     angles, raw = turns.angles[:, None] * turns.up, turns.raw_angle - np.outer(turns.duration_s, turns.bias)
-    size: FloatArray = np.linalg.norm(angles, axis=1)
-    if len(size) < 3 or np.linalg.svd(angles / size[:, None], compute_uv=False)[-1] < MIN_SPREAD:
+    size: FloatArray = np.linalg.norm(angles, axis=1, keepdims=True)
+    if len(size) < 3 or np.linalg.svd(angles / size, compute_uv=False)[-1] < MIN_SPREAD:
         return None
-    # Initial weights are equal in relative error; later ones are the inverse of the relative misfit.
-    weight: FloatArray = 1.0 / size
-    for _ in range(30):
-        solution, *_ = np.linalg.lstsq(angles * weight[:, None], raw * weight[:, None], rcond=None)
-        miss = np.linalg.norm(raw - angles @ solution, axis=1) / size
-        weight = 1.0 / (size * np.sqrt(np.maximum(miss, 1e-6 * max(float(miss.max()), TINY))))
-    if np.linalg.cond(solution) > 1.0 / MIN_SPREAD:
-        return None
-    return np.asarray(np.linalg.inv(solution.T), dtype=np.float64)
+    solution = np.linalg.lstsq(angles / size, raw / size, rcond=None)[0]
+    return None if np.linalg.cond(solution) > 1.0 / MIN_SPREAD else np.asarray(np.linalg.inv(solution.T))
 
 
 def stated(recording: Recording, moves: list[Move], angles_deg: Sequence[float]) -> list[tuple[int, Move, float]]:
