@@ -156,18 +156,6 @@ class _Windows:
     mean: FloatArray
     rate: FloatArray | None
 
-    def some(self, most: int) -> _Windows:
-        """At most ``most`` of them, evenly spread."""
-        step = -(-len(self.first) // most)
-        rate = None if self.rate is None else self.rate[::step]
-        return _Windows(self.first[::step], self.change[::step], self.mean[::step], rate)
-
-    def left(self, solution: FloatArray) -> FloatArray:
-        """(n, 3) change that the twelve coefficients do not predict."""
-        assert self.rate is not None
-        turn = self.rate @ solution[:9].reshape(3, 3).T + solution[9:]
-        return np.asarray(self.change - np.cross(self.mean, turn), dtype=np.float64)
-
 
 def drifting_blocks(
     channels: Channels, quiet: BoolArray, ranges: list[Range], centre: FloatArray, white_variance: FloatArray
@@ -228,11 +216,11 @@ def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_var
     if windows.rate is not None and len(windows.first) >= 2 * FEWEST_WINDOWS:
         # A channel that never changes has no noise for a weight.
         scale = np.sqrt(np.where(white > 0.0, white, max(float(white.max()), 1.0)))
-        some = windows.some(MOST_FITTED)
-        assert some.rate is not None
+        some = slice(None, None, -(-len(windows.first) // MOST_FITTED))
         # Least absolute deviations in units of the white noise.
-        share = _core.share_of_gyroscope(some.change, some.mean, some.rate, scale.tolist())
-        rest = windows.left(np.array(share))
+        fitted = windows.change[some], windows.mean[some], windows.rate[some]
+        share = np.array(_core.share_of_gyroscope(*fitted, scale.tolist()))
+        rest = windows.change - np.cross(windows.mean, windows.rate @ share[:9].reshape(3, 3).T + share[9:])
     seen = medians(rest**2) / float(probability.chdtri(1, 0.5))
     floor = 2.0 * channels.quantisation_variance[accelerometer] / (half * channels.length)
     return np.maximum(np.maximum(seen, white), floor)

@@ -50,14 +50,13 @@ def _merged(lines: Sequence[tuple[SpectralLine, float, int]]) -> list[SpectralLi
     """Merge lines of one frequency: powers inside a resonance are added, those of several stretches averaged."""
     groups: list[list[tuple[SpectralLine, float, int]]] = []
     for item in sorted(lines, key=lambda item: item[0].frequency_hz):
-        if groups:
-            last = groups[-1][-1][0]
-            if item[0].frequency_hz - last.frequency_hz < max(
-                0.01 * last.frequency_hz, last.width_hz, item[0].width_hz
-            ):
-                groups[-1].append(item)
-                continue
-        groups.append([item])
+        last, line = groups[-1][-1][0] if groups else item[0], item[0]
+        if groups and line.frequency_hz - last.frequency_hz < max(
+            0.01 * last.frequency_hz, last.width_hz, line.width_hz
+        ):
+            groups[-1].append(item)
+        else:
+            groups.append([item])
     out = []
     for group in groups:
         same, times_s, numbers = zip(*group, strict=True)
