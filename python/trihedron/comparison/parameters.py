@@ -7,11 +7,10 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.arrays import AXES, TINY, FloatArray, rms_of, sigmas_of
 from trihedron.comparison.fitted import FittedModel, FittedSensor
-from trihedron.estimate.sessions.changes import DRIFT_DOF
+from trihedron.estimate.sessions.changes import DRIFT_DOF, holm
 from trihedron.invariants import PAIRS, Invariants, invariants, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.probability import STRONG, chdtri, fdtrc
 from trihedron.records.diagnosis import RELATIVE, ParameterDifference
@@ -114,7 +113,7 @@ def compare_numbers(
         p = np.array([max(value, beside.get(group.id, 0.0)) for value, group in zip(p, groups, strict=True)])
     is_judged = [float(np.abs(group.difference).max()) > left_open.get(group.id, 0.0) for group in groups]
     p = np.where(is_judged, p, 1.0)
-    significant = _holm(p, alpha / 2.0)
+    significant = holm(p) <= alpha / 2.0
     out: list[ParameterDifference] = []
     for group, p_value, is_significant in zip(groups, p.tolist(), significant.tolist(), strict=True):
         named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group
@@ -130,15 +129,6 @@ def compare_numbers(
             for name, before, after, change, s in zip(named.names, *values, strict=True)
         ]
     return ComparedNumbers(tuple(out), factors)
-
-
-def _holm(p: FloatArray, alpha: float) -> npt.NDArray[np.bool_]:
-    out = np.zeros(len(p), dtype=bool)
-    for rank, k in enumerate(np.argsort(p)):
-        if p[k] > alpha / (len(p) - rank):
-            break
-        out[k] = True
-    return out
 
 
 def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], tuple[CommonFactor, ...]]:

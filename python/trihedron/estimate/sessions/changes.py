@@ -79,15 +79,19 @@ def changes_among(units: Sequence[Sequence[Session]], *, alpha: float) -> tuple[
         if len(sessions) > 1:
             ids = dict.fromkeys(parameter.id for parameter in PARAMETERS[: len(sessions[0].numbers)])
             found += [_change(sessions, name) for name in ids]
-    adjusted = np.ones(len(found))
-    worst = 0.0
-    for rank, k in enumerate(np.argsort([change.p_value for change in found])):
-        worst = max(worst, min(1.0, found[k].p_value * (len(found) - rank)))
-        adjusted[k] = worst
+    adjusted = holm([change.p_value for change in found])
     return tuple(
         replace(change, p_adjusted=float(p), significant=bool(p < alpha))
         for change, p in zip(found, adjusted, strict=True)
     )
+
+
+def holm(p_values: Sequence[float] | FloatArray) -> FloatArray:
+    """(n,) p-values adjusted for as many tests by Holm's procedure."""
+    p, adjusted = np.asarray(p_values, dtype=np.float64), np.ones(len(p_values))
+    order = np.argsort(p)
+    adjusted[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)), 1.0)
+    return adjusted
 
 
 def _change(sessions: Sequence[Session], name: str) -> Change:
