@@ -37,7 +37,7 @@ def judge_runs(
         found.append(
             Finding.of(
                 "pose-settling", poses=len(creeping), worst_pose=k + 1,
-                worst_s=_start_s(recording, poses[k]), worst_sigmas=worst, which=_named([c for _, c in creeping]),
+                worst_s=float(recording.time_s[poses[k].start]), worst_sigmas=worst, which=[c + 1 for _, c in creeping],
             )
         )  # fmt: skip
     disturbed = [k for k, pose in enumerate(poses) if pose.disturbed]
@@ -46,14 +46,14 @@ def judge_runs(
         lost = sum(b - a for a, b in spans) / recording.rate_hz
         found.append(
             Finding.of(
-                "pose-disturbed", disturbances=len(spans), poses=len(disturbed), which=_named(disturbed),
+                "pose-disturbed", disturbances=len(spans), poses=len(disturbed), which=[k + 1 for k in disturbed],
                 left_out_s=lost, first_s=recording.time_s[spans[0][0]],
             )
         )  # fmt: skip
     unsteady = [k for k, pose in enumerate(poses) if pose.is_unsteady]
     if unsteady:
-        first_s = _start_s(recording, poses[unsteady[0]])
-        which = _named(unsteady)
+        first_s = float(recording.time_s[poses[unsteady[0]].start])
+        which = [k + 1 for k in unsteady]
         found.append(Finding.of("pose-unsteady", poses=len(unsteady), which=which, first_s=first_s))
     return found
 
@@ -155,12 +155,3 @@ def judge_settling(one: Settling, means: PoseMeans) -> Finding:
         sigma_percent=sigma.max(), tau_s=one.tau_s, p_value=one.p_value, wait_s=3.0 * one.tau_s,
         mean_mg=1e3 / gravity * float(np.sqrt(np.mean(np.sum(one.mean**2, axis=1)))),
     )  # fmt: skip
-
-
-def _start_s(recording: Recording, pose: Pose) -> float:
-    return float(recording.time_s[pose.start])
-
-
-def _named(indices: list[int]) -> list[int]:
-    """Numbers of poses as in reports, from 1."""
-    return [k + 1 for k in sorted(indices)]

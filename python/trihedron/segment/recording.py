@@ -13,7 +13,7 @@ from trihedron.ranges import ranges_of
 from trihedron.records import Finding, Move, Pose, Progress, Recording, Segments
 from trihedron.records.segments import LEAST_POSE_S
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
-from trihedron.segment.floor import Activity, measure_activity
+from trihedron.segment.floor import measure_activity
 from trihedron.segment.judge import judge_log, judge_runs, judge_settling, judge_vibration, without_cut
 from trihedron.segment.means import PoseMeans, average_poses, noise_of_poses
 from trihedron.segment.noise import pool_mean_noise
@@ -55,11 +55,12 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
 def segment_blocks(recording: Recording, channels: Channels, *, progress: Progress | None = None) -> Segments:
     """As :func:`segment_recording`, from blocks; of the recording itself only rows of poses are read."""
     report = progress or (lambda _done, _text: None)
+    unknown = np.full(len(channels.quantum), np.nan)
     if channels.is_valid.sum() < WINDOW_BLOCKS:
-        return _nothing_found(recording, channels)
+        return _describe(recording, channels, unknown, [])
     activity = measure_activity(channels)
     if activity.is_drifting(channels):
-        return _nothing_found(recording, channels)
+        return _describe(recording, channels, unknown, [])
     report(0.4, "static stretches")
     quiet = whole_windows(activity.is_quiet, channels.is_valid)
     gravity = _gravity_reading(recording, channels)
@@ -80,7 +81,7 @@ def segment_blocks(recording: Recording, channels: Channels, *, progress: Progre
     found.sort(key=lambda run: run.first)
     runs, said = without_cut(recording, channels, found)
     report(0.7, "means and their errors")
-    segments = _describe(recording, channels, activity, runs)
+    segments = _describe(recording, channels, activity.white_variance, runs)
     return replace(segments, findings=(*said, *segments.findings)) if said else segments
 
 
@@ -114,18 +115,19 @@ def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
     return float((high - low).max() / 2.0) or None
 
 
-def _describe(recording: Recording, channels: Channels, activity: Activity, runs: list[Run]) -> Segments:
+def _describe(recording: Recording, channels: Channels, white_variance: FloatArray, runs: list[Run]) -> Segments:
+    """Segments of the runs; ``white_variance`` (c,) is that of a reading where there is none."""
     has_unit = acceleration_to_si(recording.accelerometer_unit) is not None
     settling = find_settling(channels, runs, has_unit=has_unit)
-    as_read = _averaged(recording, channels, activity, runs, None)
+    as_read = _averaged(recording, channels, white_variance, runs, None)
     if settling is None:
         return as_read
-    settled = _averaged(recording, settling.channels, activity, runs, settling)
+    settled = _averaged(recording, settling.channels, white_variance, runs, settling)
     return replace(settled, as_read=replace(as_read, findings=settled.findings))
 
 
 def _averaged(
-    recording: Recording, channels: Channels, activity: Activity, runs: list[Run], settling: Settling | None
+    recording: Recording, channels: Channels, white_variance: FloatArray, runs: list[Run], settling: Settling | None
 ) -> Segments:
     """Segments of the ``channels``, which are without the settling if there is any."""
     steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
@@ -134,7 +136,7 @@ def _averaged(
     poses = tuple(_pose(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
     moves = tuple(_move(k, *near) for k, near in enumerate(pairwise(zip(poses, runs, strict=True))))
     means = average_poses(recording, channels, runs, poses, noise)
-    white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else activity.white_variance
+    white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0) if pooled else white_variance
     sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
     found = judge_runs(recording, channels, runs, poses, noise.common) + judge_log(recording, channels, len(runs))
     if settling is not None:
@@ -167,14 +169,6 @@ def _move(index: int, before: tuple[Pose, Run], after: tuple[Pose, Run]) -> Move
     if not after[1].is_still:
         last = (after[0].start + after[0].stop) // 2
     return Move(index, index, index + 1, first, last)
-
-
-def _nothing_found(recording: Recording, channels: Channels) -> Segments:
-    n_channels = channels.mean.shape[1]
-    empty = np.zeros((0, n_channels))
-    means = PoseMeans(empty, empty, np.zeros(0, dtype=np.int64))
-    findings = tuple(judge_log(recording, channels, 0))
-    return _assemble(recording, (), (), np.full(n_channels, np.nan), means, findings)
 
 
 def _assemble(
