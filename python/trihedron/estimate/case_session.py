@@ -1,6 +1,5 @@
 """A session of poses and moves in the frame of a case, which stood on its faces and was turned on them."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from trihedron.estimate.accelerometer.faces import tilt_findings
 from trihedron.estimate.case_frame import (
     TABLE,
     TURN,
-    CaseFit,
     OnFaces,
     across_faces,
     at_headings,
@@ -20,7 +18,7 @@ from trihedron.estimate.case_frame import (
 )
 from trihedron.estimate.gyroscope.stated_turns import TableTurns
 from trihedron.estimate.gyroscope.turntable import moved_to, parameters_of
-from trihedron.records import Calibration, Finding, Recording, Segments
+from trihedron.records import Calibration, Recording, Segments
 from trihedron.sensor_model import correct, turned
 from trihedron.transforms import cross_matrix, directions_of, rotation_by
 
@@ -61,13 +59,9 @@ def in_case_frame(
         if np.max(np.abs(fit.steps)) < SETTLED_RAD:
             break
     after = moved_to(near, fit.values, fit.covariance, recording, segments)
-    return replace(after, findings=(*calibration.findings, *_said(after, fit, means[used], faces, used)))
-
-
-def _said(after: Calibration, fit: CaseFit, means: FloatArray, faces: IntArray, used: IntArray) -> Iterator[Finding]:
-    sensor = after.accelerometer
-    off = correct(means, sensor.S, sensor.b) - after.gravity_m_s2 * direction_of(faces)
-    return tilt_findings(fit.sizes.get(TABLE, 0.0), fit, faces, off, used)
+    off = correct(means[used], after.accelerometer.S, after.accelerometer.b) - g * direction_of(faces)
+    said = tilt_findings(fit.sizes.get(TABLE, 0.0), fit, faces, off, used)
+    return replace(after, findings=(*calibration.findings, *said))
 
 
 def _placed(up: IntArray, turns: TableTurns) -> tuple[FloatArray, IntArray]:

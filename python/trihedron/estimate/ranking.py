@@ -109,8 +109,6 @@ def suspicions_of(
 
 # Single mistakes that are tried: sign of a bias, direction (correct or distort), unit, axes, gravity.
 
-Pair = tuple[FloatArray, FloatArray]
-
 TEXTBOOK_M_S2 = 10.0
 """The largest gravity in use for calibration."""
 NEAREST = 4

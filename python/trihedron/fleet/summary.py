@@ -118,13 +118,11 @@ def _log(row: dict[str, Any]) -> FleetLog:
 def _comparable(rows: Sequence[dict[str, Any]]) -> tuple[list[dict[str, Any]], str]:
     """Trustworthy calibrations with the commonest units and sensors, in order of time; and why others are excluded."""
     sound = [row for row in rows if row["status"] == "done" and row.get("is_trustworthy")]
-    kind = Counter((row["accelerometer_unit"], row["gyroscope_unit"], len(row["parameters"])) for row in sound)
-    if not kind:
+    kinds = [(row["accelerometer_unit"], row["gyroscope_unit"], len(row["parameters"])) for row in sound]
+    if not kinds:
         return [], ""
-    chosen = kind.most_common(1)[0][0]
-    taken = [
-        row for row in sound if (row["accelerometer_unit"], row["gyroscope_unit"], len(row["parameters"])) == chosen
-    ]
+    chosen = Counter(kinds).most_common(1)[0][0]
+    taken = [row for row, kind in zip(sound, kinds, strict=True) if kind == chosen]
     doubtful = [row for row in rows if row["status"] == "done" and not row.get("is_trustworthy")]
     unlike = [row for row in sound if row not in taken]
     words = []

@@ -93,23 +93,15 @@ def _timed_means(
 
 
 def noise_from_poses(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
-    """White noise from the scatter inside the poses, and the LSB where it exceeds that; no slow noise.
-
-    Raises ``InputError`` when there is no accelerometer.
-    """
-    a = recording.accelerometer
-    if a is None:
-        raise InputError(f"{recording.source}: there is no accelerometer to calibrate in this log")
-    sigma = segments.accelerometer_sigma
-    sigma = np.zeros(3) if sigma is None else sigma
-    noises, steps = [], recording.facts.of("accelerometer").step
-    for axis in range(3):
-        white = float(sigma[axis]) / np.sqrt(recording.rate_hz)
-        step = float(steps[axis])
-        # An LSB below the noise is dithered and already in the scatter.
-        resolution = step if step > float(sigma[axis]) else 0.0
-        noises.append(AxisNoise(white=white, resolution=resolution, sample_sigma=float(sigma[axis])))
-    return noises[0], noises[1], noises[2]
+    """White noise from the scatter inside the poses, and the LSB where it exceeds that; no slow noise."""
+    sigma = np.zeros(3) if segments.accelerometer_sigma is None else segments.accelerometer_sigma
+    steps = recording.facts.of("accelerometer").step
+    # An LSB below the noise is dithered and already in the scatter.
+    x, y, z = (
+        AxisNoise(white=own / np.sqrt(recording.rate_hz), resolution=step if step > own else 0.0, sample_sigma=own)
+        for own, step in zip(sigma.tolist(), steps.tolist(), strict=True)
+    )
+    return x, y, z
 
 
 def _noise(

@@ -31,7 +31,6 @@ from trihedron.estimate.noise.slow_changes import (
     MOSTLY,
     STEP,
     SlowChange,
-    beside_each,
     share_of_temperature,
     slow_changes,
     steps_of,
@@ -250,8 +249,10 @@ class Channel:
         range_degc = remarks.UNLOGGED if heat is None else (float(np.min(heat)), float(np.max(heat)))
         head = None if self.head is None else (self.head, blank.rate_hz)
         choices = []
-        for k, (x, changes) in enumerate(beside_each(self.column, self.choices, self.rate_hz)):
+        stated = self.column - without(self.column, self.choices[0], self.rate_hz)
+        for k, changes in enumerate(self.choices):
             smooth = [one for one in changes if one.kind != STEP]
+            x = without(self.column + stated, changes, self.rate_hz) if k else self.column
             bands = ordinates(x, self.rate_hz, self.stretches(k), smooth, head)
             choices.append([replace(band, count=even * band.count) for band in bands])
         # N of a level that changes is the mean of a sample of pieces.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice, pairwise
@@ -129,16 +129,6 @@ def steps_of(changes: Sequence[SlowChange], n: int, rate_hz: float) -> list[Even
             middle = one.time_s * rate_hz
             out.append(Event(int(middle - half), int(middle + half) + 1, one.size))
     return out
-
-
-def beside_each(
-    x: FloatArray, choices: Sequence[Sequence[SlowChange]], rate_hz: float
-) -> Iterator[tuple[FloatArray, Sequence[SlowChange]]]:
-    """Readings without the changes of each choice, and these, from readings ``x`` (n,) without those of the first."""
-    first, *others = choices
-    yield x, first
-    for changes in others:
-        yield without(x, changes, rate_hz) + (x - without(x, first, rate_hz)), changes
 
 
 Time = tuple[float, int]
