@@ -23,7 +23,7 @@ from trihedron.diagnose.session.starting_point import start_state
 from trihedron.records import Finding, Severity
 from trihedron.records.domains import DomainTest
 from trihedron.segment import resegment, segment_recording
-from trihedron.session.model import DYNAMICS, MOVES, contiguous, core_state
+from trihedron.session.model import DYNAMICS, MOVES, core_state
 from trihedron.session.noise import ANYTHING
 from trihedron.simulate import diagnosed_sizes
 
@@ -54,7 +54,7 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     variant = effect.variants(model.context)[0]
     one = Term(effect, variant, effect.sizes(model.context, variant))
     core = model.fitted.core
-    columns = (contiguous(one.distortion.force), contiguous(one.distortion.rate))
+    columns = (one.distortion.force, one.distortion.rate)
     asked = [(*columns, one.sizes.tolist())]
     ((seen, _, _),) = core.candidate_gains(asked, [1.0], [core.strengths])
     # What the fit's unknowns imitate is projected out; the rest is a Gaussian with a prior of the sizes.

@@ -1,10 +1,11 @@
 //! Binding of the joints of a motion.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, flat1, flat3};
 use super::ranges::ranges_within;
+use crate::aliasing;
 use crate::joints::{self, Readings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -21,14 +22,15 @@ type Seen<'py> = (
 
 /// Samples missing in moves `(m, 2)`: the samples behind which they are missing, clearest first, their numbers, gains in
 /// log-likelihood over none missing, and over unrelated sides as well; and the number of joints at which as many
-/// missing samples as the median loss has would be seen. `readings` has an array `(n, 3)` a sensor, in units of its noise; `is_broken` `(n,)`: no joint
-/// is asked near the sample.
+/// missing samples as the median loss has would be seen. `readings` has an array `(n, 3)` a sensor, in units of its noise,
+/// at `time_s` `(n,)`, usually `step_s` apart: no joint is asked at a gap, or near samples that are `is_cut` `(n,)`.
 #[pyfunction]
 fn motion_joints<'py>(
     py: Python<'py>,
     readings: Vec<PyReadonlyArray2<'py, f64>>,
     moves: PyReadonlyArray2<'py, i64>,
-    is_broken: PyReadonlyArray1<'py, bool>,
+    time_s: (PyReadonlyArray1<'py, f64>, f64),
+    is_cut: Option<PyReadonlyArray1<'py, bool>>,
     most: usize,
     least: f64,
 ) -> PyResult<Seen<'py>> {
@@ -36,8 +38,13 @@ fn motion_joints<'py>(
         .iter()
         .map(|one| flat3("readings", one))
         .collect::<PyResult<_>>()?;
-    let is_broken = flat1(&is_broken);
-    let moves = ranges_within(&moves, is_broken.len())?;
+    let (time_s, step_s) = time_s;
+    let n = time_s.len();
+    let mut is_broken = is_cut.map_or_else(|| vec![false; n], |cut| flat1(&cut).into_owned());
+    for k in aliasing::behind_gaps(&flat1(&time_s), step_s) {
+        is_broken[k] = true;
+    }
+    let moves = ranges_within(&moves, n)?;
     let sensors: Vec<Readings<'_>> = flat.iter().map(|one| as_rows(one)).collect();
     let found = super::run(py, || {
         joints::joints(&sensors, &moves, &is_broken, most, least)

@@ -6,7 +6,7 @@
 )]
 
 use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
     ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
@@ -31,8 +31,8 @@ type Adc<'py> = (
 /// As [`rounding::InMoves`](crate::rounding::InMoves).
 type InMoves<'py> = (
     Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<bool>>,
-    Vec<(usize, Bound<'py, PyArray1<f64>>)>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray3<f64>>,
 );
 
 /// A kernel's answer about `readings` `(n, 3)` of an `adc`; `steady` as [`Coarse`] has them.
@@ -68,8 +68,8 @@ fn rounding_variance<'py>(
     rows(py, out.as_flattened(), 3)
 }
 
-/// Rounding in the moves `edges` `(m, 2)`: variance `(n, 3)` of readings, whether an axis is in the LSB of its bias
-/// `(n, 3)`, and errors `(n,)` of one standard deviation each that all moves share, with the axis of each.
+/// Rounding in the moves `edges` `(m, 2)`: variance `(n, 3)` of readings, 1 where an axis is in the LSB of its bias
+/// `(n, 3)`, and errors `(n, 3, k)` of one standard deviation each that all moves share.
 #[pyfunction]
 fn rounding_in_moves<'py>(
     py: Python<'py>,
@@ -81,11 +81,21 @@ fn rounding_in_moves<'py>(
     let edges = ranges_within(&edges, readings.shape()[0])?;
     let of_moves = |one: &Coarse<'_>| one.in_moves(&edges);
     let (variance, is_static, shared) = asked(py, &readings, &adc, steady, of_moves)?;
-    let array = |(axis, error): (usize, Vec<f64>)| (axis, error.to_pyarray(py));
-    let is_static = is_static.as_flattened().to_pyarray(py);
+    let is_static: Vec<f64> = is_static
+        .as_flattened()
+        .iter()
+        .map(|&is| f64::from(is))
+        .collect();
+    let (n, k) = (variance.len(), shared.len());
+    let mut errors = vec![0.0; 3 * n * k];
+    for (at, (axis, error)) in shared.iter().enumerate() {
+        for (row, value) in error.iter().enumerate() {
+            errors[(3 * row + axis) * k + at] = *value;
+        }
+    }
     Ok((
         rows(py, variance.as_flattened(), 3)?,
-        is_static.reshape([variance.len(), 3])?,
-        shared.into_iter().map(array).collect(),
+        rows(py, &is_static, 3)?,
+        errors.to_pyarray(py).reshape([n, 3, k])?,
     ))
 }

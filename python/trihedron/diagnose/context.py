@@ -67,7 +67,7 @@ class Context:
 
     # -- motion ---------------------------------------------------------------------------------------------------
     @cached_property
-    def _motion(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _motion(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         return self.fitted.core.path()
 
     @property
@@ -83,32 +83,28 @@ class Context:
     @property
     def turned(self) -> FloatArray:
         """(points, 3, 3) rotation since the move began."""
-        return np.concatenate([np.tile(np.eye(3), (self.obs.n_poses, 1, 1)), self._motion[2]])
+        return self._motion[3]
 
     def derivative(self, values: FloatArray) -> FloatArray:
         """(points, 3) time derivative inside moves; zero in poses."""
-        return _core.move_derivative(self.time_s, np.ascontiguousarray(values), self.move_edges)
+        return _core.move_derivative(self.time_s, values, self.move_edges)
 
     def shifted(self, values: FloatArray, ahead_s: float) -> FloatArray:
         """(points, 3) values at a time ``ahead_s`` later inside moves, constant beyond their ends; unchanged in poses.
 
         By a cubic spline per move with zero slope at its ends: linear interpolation would be a low-pass of its own.
         """
-        values = np.ascontiguousarray(np.asarray_chkfinite(values))
-        return _core.move_shifted(self.time_s, values, self.move_edges, ahead_s)
+        return _core.move_shifted(self.time_s, np.asarray_chkfinite(values), self.move_edges, ahead_s)
 
     @cached_property
     def angular_acceleration(self) -> FloatArray:
         """(points, 3) derivative of angular rate."""
         return self.derivative(self.rate)
 
-    @cached_property
+    @property
     def gravity_in_moves(self) -> FloatArray:
         """(points, 3) minus gravity in the body, propagated by the gyro from each move's start; ``force`` in poses."""
-        out, up, turned = self.force.copy(), self.fitted.state.up, self.turned
-        for where, (before, _) in zip(self.moves, self.obs.move_poses, strict=True):
-            out[where] = self.fitted.state.gravity * turned[where] @ up[before]
-        return out
+        return self._motion[2]
 
     @cached_property
     def norm_columns(self) -> FloatArray:
@@ -279,7 +275,7 @@ class Context:
 
         Poses that no chain of moves reaches have NaN but for the vertical, which gravity shows.
         """
-        obs, up, out = self.obs, self.fitted.state.up, self.turned
+        obs, up, out = self.obs, self.fitted.state.up, self.turned.copy()
 
         def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
             x = x_guess - up * (up @ x_guess)

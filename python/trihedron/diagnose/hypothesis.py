@@ -15,7 +15,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS,
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Distortion, Fit, solved, stacked
 from trihedron.records.domains import HeldOut
-from trihedron.session.model import DYNAMICS, MOVES, NOTHING, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState, contiguous
+from trihedron.session.model import DYNAMICS, MOVES, NOTHING, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
 from trihedron.threads import side_by_side
 
@@ -210,11 +210,8 @@ class Hypothesis:
         return any(after[d][0] < before[d][0] for own in changed for d in own if d in after and d in before)
 
 
-Column = tuple[FloatArray | None, FloatArray | None, list[float]]
-
-
-def _column(distortion: Distortion, sizes: FloatArray) -> Column:
-    return contiguous(distortion.force), contiguous(distortion.rate), sizes.tolist()
+def _column(distortion: Distortion, sizes: FloatArray) -> tuple[FloatArray | None, FloatArray | None, list[float]]:
+    return distortion.force, distortion.rate, sizes.tolist()
 
 
 def hypothesis(

@@ -8,8 +8,6 @@ from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.probability import STRONG
 
-GAP = 1.5
-"""A step longer than this many usual ones has lost samples, as in the session model."""
 MOST_LOST, LONGEST_LOSS_S = 60, 0.15
 """Longest gap, samples or seconds, whichever is more, that is tried: a fifth of a quick hand move."""
 
@@ -55,11 +53,9 @@ def joints(
     jolt or of another motion that begins (docs/diagnosis-method.md, 8.16). No joint is asked at a gap of the
     timestamps, or near samples that are ``is_cut`` (n,).
     """
-    is_broken: BoolArray = np.diff(time_s, prepend=time_s[0]) > GAP / rate_hz
-    if is_cut is not None:
-        is_broken |= is_cut
-    whole = [np.ascontiguousarray(one, dtype=np.float64) for one in readings]
     most = most_lost(rate_hz)
     least = float(np.log(STRONG * most * max(int((moves[:, 1] - moves[:, 0]).sum()), 1)))
-    sample, count, gain, over_unrelated, telling = _core.motion_joints(whole, moves, is_broken, most, least)
+    sample, count, gain, over_unrelated, telling = _core.motion_joints(
+        readings, moves, (time_s, 1.0 / rate_hz), is_cut, most, least
+    )
     return Joints(sample, count, gain, over_unrelated > least, telling)

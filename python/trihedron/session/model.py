@@ -6,25 +6,27 @@ the sensor's noise (docs/model-session.md). The arithmetic is :class:`trihedron.
 """
 
 from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import AXES, FloatArray
 from trihedron.session.noise import SessionNoise
 from trihedron.transforms import directions_of
 
-LOWER = np.tril_indices(3)
+LOWER = np.tril_indices(len(AXES))
 """Indices of a lower-triangular scale, row by row."""
-STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
+RowDomain = IntEnum("RowDomain", "STATIC_ACCEL STATIC_GYRO MOVES DYNAMICS PRIOR", start=0)
+STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = RowDomain
 """Labels of residual rows; ``PRIOR`` rows keep undetermined directions finite and belong to no domain."""
 
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
 """No further columns, as a hypothesis of the core."""
 
 
-@dataclass(frozen=True, eq=False)
-class Prior:
+class Prior(NamedTuple):
     """Prior mean and covariance of the 18 unknowns of the centred model.
 
     A given calibration, which the recording may contradict, or, if ``is_weak``, the range of any such instrument.
@@ -50,11 +52,6 @@ class SessionState:
     effect: FloatArray
 
 
-def contiguous(values: FloatArray | None) -> FloatArray | None:
-    """Values as a contiguous float64 array for the core."""
-    return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SessionReadings(SessionNoise):
     """Pose means ``pose_force``, ``pose_rate`` (h, 3) of a session with their noise, relative to ``force_origin``,
@@ -77,26 +74,19 @@ class SessionReadings(SessionNoise):
     def core_poses(self) -> _core.SessionPoses:
         """The poses as input of the core."""
         return _core.SessionPoses(
-            time_s=np.ascontiguousarray(self.pose_time_s, dtype=np.float64),
-            force=np.ascontiguousarray(self.pose_force), force_sigma=np.ascontiguousarray(self.pose_force_sigma),
-            force_density=np.ascontiguousarray(self.force_density), rate=contiguous(self.pose_rate),
-            rate_sigma=contiguous(self.pose_rate_sigma), rate_density=contiguous(self.rate_density),
-            force_along=self.force_up,
+            time_s=self.pose_time_s, force=self.pose_force, force_sigma=self.pose_force_sigma,
+            force_density=self.force_density, rate=self.pose_rate, rate_sigma=self.pose_rate_sigma,
+            rate_density=self.rate_density, force_along=self.force_up,
         )  # fmt: skip
 
     def core_model(
-        self,
-        gravity_m_s2: float,
-        moves: _core.SessionMoves,
-        timing_s: tuple[float, float],
-        prior: Prior | None,
+        self, gravity_m_s2: float, moves: _core.SessionMoves, timing_s: tuple[float, float], prior: Prior | None
     ) -> _core.SessionModel:
         """The Rust model; ``timing_s``: scatter of the sampling instants, and the sample interval."""
         unit = self.scatter_unit()
         return _core.SessionModel(
             gravity=(gravity_m_s2, self.earth_up_rad_s), poses=self.core_poses(), moves=moves, noise=timing_s,
-            prior=None if prior is None else (prior.mean, prior.covariance, prior.is_weak),
-            scatter=(unit, self.force_scatter / float(unit[0, 0])),
+            prior=prior, scatter=(unit, self.force_scatter / float(unit[0, 0])),
         )  # fmt: skip
 
     def at_means(
@@ -118,14 +108,10 @@ def misfits(core: _core.SessionFit) -> tuple[FloatArray, FloatArray]:
 def core_state(state: SessionState) -> _core.SessionState:
     """A state of the session as input of the Rust model: biases in raw units."""
     return _core.SessionState(
-        force_scale=np.ascontiguousarray(state.accel_S),
-        force_bias=np.ascontiguousarray(state.accel_b),
-        rate_scale=np.ascontiguousarray(state.gyro_S),
-        up=np.ascontiguousarray(state.up),
-        pose_rate_bias=np.ascontiguousarray(np.linalg.solve(state.gyro_S, state.gyro_bias.T).T),
-        pose_force_bias=np.ascontiguousarray(np.linalg.solve(state.accel_S, state.accel_bias.T).T),
-        effect=np.ascontiguousarray(state.effect, dtype=np.float64),
-    )
+        force_scale=state.accel_S, force_bias=state.accel_b, rate_scale=state.gyro_S, up=state.up, effect=state.effect,
+        pose_rate_bias=np.asarray(np.linalg.solve(state.gyro_S, state.gyro_bias.T).T, dtype=np.float64),
+        pose_force_bias=np.asarray(np.linalg.solve(state.accel_S, state.accel_bias.T).T, dtype=np.float64),
+    )  # fmt: skip
 
 
 def state_of(core: _core.SessionFit, gravity_m_s2: float) -> SessionState:

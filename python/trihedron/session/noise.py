@@ -14,8 +14,6 @@ from trihedron.session.rounding import rounding_of_moves
 
 LEAST_SHARE = 1e-9
 """Least error of a pose mean over the largest reading, for logs without scatter (a simulation without noise)."""
-Along = tuple[FloatArray, FloatArray]
-"""Directions (h, 3) and the standard errors (h,) of pose means along them."""
 Pair = tuple[float, float]
 Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair]
 """Corner times of walks [s], scatter from pose to pose in its units (accelerometer, gyro by axis), departure in moves
@@ -60,7 +58,7 @@ class SessionNoise:
     force_density: FloatArray
     pose_rate_sigma: FloatArray | None
     rate_density: FloatArray | None
-    force_up: Along | None = None
+    force_up: tuple[FloatArray, FloatArray] | None = None
     force_scatter: float = 0.0
     rate_scatter: float = 0.0
 
@@ -77,6 +75,20 @@ class SessionNoise:
         if self.pose_rate_sigma is not None:
             out[1] = rms_of(medians(self.pose_rate_sigma))
         return np.maximum(out, TINY)
+
+    def norm_sigma(self, gradient: FloatArray) -> FloatArray:
+        """(h,) standard errors of a quantity with gradient (h, 3) by the raw means, the norm of gravity say.
+
+        Across the vertical from the errors of the axes, along it from the vertical's own where it is known.
+        """
+        plain = (gradient**2 * self.pose_force_sigma**2).sum(axis=1)
+        if self.force_up is None:
+            return np.asarray(np.sqrt(plain))
+        up, error = self.force_up
+        share = (gradient * up).sum(axis=1)
+        across, known = gradient - share[:, None] * up, np.isfinite(error)
+        own = share**2 * np.where(known, error, 0.0) ** 2
+        return np.asarray(np.sqrt(np.where(known, (across**2 * self.pose_force_sigma**2).sum(axis=1) + own, plain)))
 
 
 def measure_noise(
@@ -118,26 +130,10 @@ def measure_noise(
         if sigma is not None and density is not None:
             variances[:, 2 + k] += _core.coloured_variance(readings, (spans, sigma), density, step_s, moves_last)
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
-    along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
+    along = None if up is None or error is None else (up, np.maximum(error, floor))
     scatter = 0.0 if along is None else _core.flicker_scatter(recording.accelerometer, spans, up, FEWEST_POSES)
     noise = SessionNoise(
         pose_force_sigma=force_sigma, force_density=force_density, force_up=along, force_scatter=scatter,
         pose_rate_sigma=rate_sigma, rate_density=rate_density, rate_scatter=of_rate,
     )  # fmt: skip
     return noise, variances
-
-
-def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:
-    """(h,) standard errors of a quantity with gradient ``gradient`` (h, 3) by the means, as in the session model.
-
-    Across the vertical from the errors of the axes (h, 3), along it from the vertical's own where it is known.
-    """
-    plain = (gradient**2 * sigma**2).sum(axis=1)
-    if along is None:
-        return np.asarray(np.sqrt(plain))
-    up, error = along
-    share = (gradient * up).sum(axis=1)
-    across = gradient - share[:, None] * up
-    known = np.isfinite(error)
-    own = share**2 * np.where(known, error, 0.0) ** 2
-    return np.asarray(np.sqrt(np.where(known, (across**2 * sigma**2).sum(axis=1) + own, plain)))

@@ -80,12 +80,7 @@ def rounding_in_moves(
     # A bias near the edge of a code has one code in some poses, the next one in others.
     away = np.abs(means - medians(means))
     rest = np.mean(means, axis=0, where=away <= np.maximum(quantum, away.min(axis=0)))
-    adc = quantum, rest, axes
-    variance, is_static, shared = _core.rounding_in_moves(readings, adc, edges, STEADY)
-    errors = np.zeros((*readings.shape, len(shared)))
-    for k, (axis, error) in enumerate(shared):
-        errors[:, axis, k] = error
-    return variance, is_static.astype(np.float64), errors
+    return _core.rounding_in_moves(readings, (quantum, rest, axes), edges, STEADY)
 
 
 def biases_by_codes(

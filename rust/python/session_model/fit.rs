@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::evidence::{Answer, Candidate, Glance, seen, tuned};
-use super::read_out::{Blocks, Rows, Shares, flagged, labels, moves, path, shares_of, stacked};
+use super::read_out::{Path, Shares, flagged, labels, moves, path, shares_of, stacked};
 use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
 use crate::python::arrays::{matrix, of3, vector3, vectors};
@@ -138,9 +138,9 @@ impl SessionFit {
         labels(py, &self.fit)
     }
 
-    /// `(points, 3)` corrected rate and force, `(move samples, 3, 3)` attitude since each move began.
-    #[allow(clippy::type_complexity)]
-    fn path<'py>(&self, py: Python<'py>) -> PyResult<(Rows<'py>, Rows<'py>, Blocks<'py>)> {
+    /// `(points, 3)` corrected rate and force, minus gravity propagated by the gyro from each move's start; `(points, 3,
+    /// 3)` rotation since the move began.
+    fn path<'py>(&self, py: Python<'py>) -> PyResult<Path<'py>> {
         path(py, &self.session, &self.fit)
     }
 

@@ -1,6 +1,6 @@
 //! Rows and motion of a fitted session as arrays.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
     ToPyArray,
@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::python::arrays::vectors;
+use crate::python::arrays::{stack3, vectors};
 use crate::session_model::Session;
 use crate::session_model::fit::Fit;
 use crate::session_model::lost_samples::{N_RATE, Share};
@@ -42,28 +42,33 @@ pub(super) fn labels<'py>(py: Python<'py>, fit: &Fit) -> PyResult<Bound<'py, PyA
     flat.to_pyarray(py).reshape([n, 4])
 }
 
-/// `(points, 3)` corrected rate and force, `(move samples, 3, 3)` attitude since each move began.
-pub(super) fn path<'py>(
-    py: Python<'py>,
-    session: &Session,
-    fit: &Fit,
-) -> PyResult<(Rows<'py>, Rows<'py>, Blocks<'py>)> {
+/// Rate, force, minus gravity propagated by the gyro from each move's start `(points, 3)`; rotation since the move began
+/// `(points, 3, 3)`.
+pub(super) type Path<'py> = (Rows<'py>, Rows<'py>, Rows<'py>, Blocks<'py>);
+
+/// The motion at the poses, then at the samples of every move: corrected readings in the body.
+pub(super) fn path<'py>(py: Python<'py>, session: &Session, fit: &Fit) -> PyResult<Path<'py>> {
     let h = session.n_poses();
     let mut rate = vec![Vector3::zeros(); h];
     let mut force: Vec<Vector3<f64>> = fit.state.up.iter().map(|up| up * session.gravity).collect();
-    let mut attitude: Vec<f64> = Vec::new();
-    for one in &fit.passed {
+    let mut gravity = force.clone();
+    let mut turned = vec![Matrix3::identity(); h];
+    for (one, of) in fit.passed.iter().zip(session.moves.iter()) {
         rate.extend_from_slice(&one.carried.rate);
         force.extend_from_slice(&one.carried.force);
-        for turn in &one.carried.attitude {
-            attitude.extend_from_slice(turn.transpose().as_slice());
-        }
+        gravity.extend(
+            one.carried
+                .attitude
+                .iter()
+                .map(|turn| turn * force[of.before]),
+        );
+        turned.extend_from_slice(&one.carried.attitude);
     }
-    let n = attitude.len() / 9;
     Ok((
         vectors(py, &rate)?,
         vectors(py, &force)?,
-        attitude.to_pyarray(py).reshape([n, 3, 3])?,
+        vectors(py, &gravity)?,
+        stack3(py, turned.into_iter())?,
     ))
 }
 

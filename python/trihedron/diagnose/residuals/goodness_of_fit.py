@@ -13,7 +13,7 @@ from trihedron.session.noise import NOISE_DOF
 ROW_DOMAINS: dict[int, Domain] = {
     STATIC_ACCEL: "static-accel", STATIC_GYRO: "static-gyro", MOVES: "moves", DYNAMICS: "dynamics"
 }  # fmt: skip
-ROW_UNITS = {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
+ROW_UNITS: dict[int, str] = {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
 """Units of :func:`physical_rms`."""
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 N_DOMAINS_TESTED = float(len(DOMAINS))
@@ -78,7 +78,7 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> dict[i
         return np.asarray(np.linalg.solve(white, r[rows].reshape(len(white), -1, 1))[:, :, 0])
 
     error = errors((STATIC_ACCEL,), fitted.obs.core_poses().force_white() @ np.linalg.inv(state.accel_S))
-    out = {STATIC_ACCEL: rms_of(np.einsum("ni,ni->n", error, state.up))}
+    out: dict[int, float] = {STATIC_ACCEL: rms_of(np.einsum("ni,ni->n", error, state.up))}
     sigma = fitted.obs.pose_rate_sigma
     if sigma is not None:
         out[STATIC_GYRO] = rms_of(errors((STATIC_GYRO,), np.linalg.inv(state.gyro_S) / sigma[:, :, None]))

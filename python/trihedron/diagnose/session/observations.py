@@ -15,7 +15,7 @@ from trihedron.errors import InputError
 from trihedron.gravity import earth_rate_up
 from trihedron.records import Recording, Segments
 from trihedron.session.model import Prior, SessionReadings, SessionState
-from trihedron.session.noise import FEWEST_READINGS, along_gradient, measure_noise
+from trihedron.session.noise import FEWEST_READINGS, measure_noise
 from trihedron.session.rounding import (
     UNIFORM,
     biases_by_codes,
@@ -115,17 +115,12 @@ class Observations(SessionReadings):
         pose_rate, sigma, unresolved = support.applied(*seen, gyro_S)
         return replace(self, unresolved=unresolved, pose_rate=pose_rate, pose_rate_sigma=sigma, leans=support.leans)
 
-    def norm_sigma(self, gradient: FloatArray) -> FloatArray:
-        """(h,) standard errors of the norm of gravity, SI, whose gradient by the raw means is ``gradient`` (h, 3)."""
-        return along_gradient(self.pose_force_sigma, self.force_up, gradient)
-
     def pose_means(self, samples: FloatArray) -> FloatArray:
         """(poses, ...) means over each pose of a whole-recording signal (n, ...), without missing readings."""
         poses = self.segments.poses
         ranges = [span for pose in poses for span in pose.undisturbed()]
         owner = [i for i, pose in enumerate(poses) for _ in pose.undisturbed()]
-        flat = np.ascontiguousarray(samples.reshape(len(samples), -1))
-        means = _core.column_means(flat, np.array(ranges), np.array(owner), len(poses))
+        means = _core.column_means(samples.reshape(len(samples), -1), np.array(ranges), np.array(owner), len(poses))
         return np.asarray(means.reshape(-1, *samples.shape[1:]))
 
     def model(self, gravity_m_s2: float, prior: Prior | None) -> _core.SessionModel:
@@ -151,15 +146,10 @@ class Observations(SessionReadings):
         )
         assert force is not None
         return _core.SessionMoves(
-            pose_time_s=np.ascontiguousarray(self.pose_time_s, dtype=np.float64),
-            time_s=np.ascontiguousarray(self.time_s),
-            force=force,
-            rate=rate,
-            ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
-            before=np.ascontiguousarray(self.move_poses[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
-            unresolved=np.ascontiguousarray(self.unresolved),
-            leans=np.zeros((self.n_poses, 2, 3)) if self.leans is None else self.leans,
-        )
+            pose_time_s=self.pose_time_s, time_s=self.time_s, force=force, rate=rate,
+            ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2), before=self.move_poses[:, 0],
+            unresolved=self.unresolved, leans=np.zeros((self.n_poses, 2, 3)) if self.leans is None else self.leans,
+        )  # fmt: skip
 
 
 def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
@@ -267,6 +257,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
     """
     changed: dict[str, FloatArray] = {}
     swing = np.zeros((segments.n_poses, 2, 3))
+    whole = np.array([(p.start, p.start if p.disturbed else p.stop) for p in segments.poses], dtype=np.int64)
     both = (("accelerometer", recording.accelerometer), ("gyroscope", recording.gyroscope))
     for s, (sensor, readings) in enumerate(both):
         mean, error = getattr(segments, f"{sensor}_mean"), getattr(segments, f"{sensor}_sigma_mean")
@@ -276,21 +267,12 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
         white = sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]
         # Ratio of the errors of means to white noise: a line does not change the slow noise.
         colour = np.maximum(np.median(error / np.maximum(white, TINY), axis=0), 1.0)
-        new_mean, new_error = mean.copy(), error.copy()
-        for k, pose in enumerate(segments.poses):
-            part = readings[pose.start : pose.stop]
-            if pose.disturbed or len(part) < FEWEST_READINGS or not np.isfinite(part).all():
-                continue
-            found = _core.pose_beside_lines(part, sigma)
-            if found is None:
-                continue
-            fitted, own, integral, has_line = (np.array(of_axes) for of_axes in found)
-            swing[k, s] = np.where(has_line, integral / recording.rate_hz**2, 0.0)
-            new_mean[k] = np.where(has_line, fitted, mean[k])
-            new_error[k] = np.where(has_line, colour * own, error[k])
-        if (new_mean != mean).any():
-            changed |= {f"{sensor}_mean": new_mean, f"{sensor}_sigma_mean": new_error}
-            if s == 0 and segments.accelerometer_sigma_up is not None:
-                moved = (new_mean != mean).any(axis=1)
-                changed["accelerometer_sigma_up"] = np.where(moved, np.nan, segments.accelerometer_sigma_up)
-    return (replace(segments, **changed) if changed else segments), swing  # type: ignore[arg-type]
+        fitted, own, integral = _core.poses_beside_lines(readings, whole, sigma, FEWEST_READINGS)
+        has_line = np.isfinite(fitted)
+        swing[:, s] = np.where(has_line, integral / recording.rate_hz**2, 0.0)
+        changed[f"{sensor}_mean"] = np.where(has_line, fitted, mean)
+        changed[f"{sensor}_sigma_mean"] = np.where(has_line, colour * own, error)
+        if s == 0 and segments.accelerometer_sigma_up is not None:
+            up = np.where(has_line.any(axis=1), np.nan, segments.accelerometer_sigma_up)
+            changed["accelerometer_sigma_up"] = up
+    return replace(segments, **changed), swing  # type: ignore[arg-type]

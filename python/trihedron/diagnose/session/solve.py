@@ -22,7 +22,6 @@ from trihedron.session.model import (
     STATIC_GYRO,
     Prior,
     SessionState,
-    contiguous,
     core_state,
     state_of,
 )
@@ -131,8 +130,7 @@ class Fit:
 
         It includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
         """
-        origins = (np.ascontiguousarray(one) for one in (self.obs.force_origin, self.obs.rate_origin))
-        return self.core.linear_covariance(*origins)
+        return self.core.linear_covariance(self.obs.force_origin, self.obs.rate_origin)
 
 
 def solved(
@@ -155,8 +153,8 @@ def solved(
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
     core = obs.model(start.gravity, prior).fit(
-        state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
-        rate_effect=contiguous(distortion.rate), within=within, sizes=None if sizes is None else sizes.tolist(),
+        state=core_state(start), strengths=strengths, force_effect=distortion.force, rate_effect=distortion.rate,
+        within=within, sizes=None if sizes is None else sizes.tolist(),
     )  # fmt: skip
     return Fit(obs, state_of(core, start.gravity), distortion, prior, core)
 

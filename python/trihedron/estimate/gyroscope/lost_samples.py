@@ -10,8 +10,10 @@ from trihedron.arrays import TINY, FloatArray
 from trihedron.probability import STRONG
 from trihedron.ranges import rows_beside
 from trihedron.records import Finding, Recording, Segments, Severity
-from trihedron.session.joints import GAP, Joints, joints
+from trihedron.session.joints import Joints, joints
 
+GAP = 1.5
+"""A step longer than this many usual ones has lost samples, as in the session model."""
 EVEN = 1e-4
 """Scatter of the timestamps, in steps, up to which they may be computed from the row number."""
 OWN_CLOCK = 1.5

@@ -20,7 +20,6 @@ from trihedron.gravity import turned_with_earth
 from trihedron.records import Calibration, FitQuality, Segments
 from trihedron.sensor_model import in_frame, norms
 from trihedron.session.model import DYNAMICS, MOVES, STATIC_ACCEL
-from trihedron.session.noise import along_gradient
 from trihedron.transforms import directions_of
 
 N_GYROSCOPE = 9
@@ -51,7 +50,7 @@ def norm_errors(observed: Observed, S_a: FloatArray, b_a: FloatArray) -> tuple[F
     force = (observed.pose_force + observed.force_origin) @ S_a.T + b_a
     norm = np.linalg.norm(force, axis=1)
     gain = (force / norm[:, None]) @ S_a
-    return norm - observed.gravity_m_s2, along_gradient(observed.pose_force_sigma, observed.force_up, gain)
+    return norm - observed.gravity_m_s2, observed.norm_sigma(gain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +192,7 @@ def carried(
     of_before, of_after = (-np.einsum("mij,mj->mi", S_w, measured.bias[of]) for of in (before, after))
     noise = _core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s)
     rotation, wrt_scale, wrt_before, wrt_after, wrt_room, cov_rate = _core.integrate_moves(
-        measured.time_s, measured.rate, measured.edges, np.ascontiguousarray(anchors_s), S_w, of_before, of_after, 3,
+        measured.time_s, measured.rate, measured.edges, anchors_s, S_w, of_before, of_after, 3,
         noise,
     )  # fmt: skip
     earth = turned_with_earth(measured.latitude_deg, directions_of(start))

@@ -219,11 +219,8 @@ def _fit(
 ) -> _core.SessionFit:
     """One fit, from a state of another one unless it ``is_rough``; noise strengths are optimised ``within`` bounds if
     given. Effects on the readings are converted to SI with the scales of the sensors."""
-    force, rate = (
-        np.ascontiguousarray(S @ effect)
-        for S, effect in ((state.accel_S, observed.force_effect), (state.gyro_S, observed.rate_effect))
-    )
     return observed.model().fit(
-        state=core_state(state), strengths=strengths, force_effect=force, rate_effect=rate, within=within,
+        state=core_state(state), strengths=strengths, force_effect=state.accel_S @ observed.force_effect,
+        rate_effect=state.gyro_S @ observed.rate_effect, within=within,
         sizes=observed.effect_sigma.tolist(), is_near=not is_rough, is_rough=is_rough,
     )  # fmt: skip

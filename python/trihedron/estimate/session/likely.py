@@ -88,7 +88,7 @@ def _shapes(observed: Observed, core: _core.SessionFit, cause: str) -> list[Colu
         force = observed.effect_force @ np.asarray(core.force_scale).T + np.asarray(core.force_bias)
         return [(None, by_force(force), [PER_FORCE] * 9)]
     sensor = int(cause == "gyro-bias-drift")
-    each = [np.ascontiguousarray(curve[:, None, None] * np.eye(3)) for curve in _curves(observed)]
+    each = [curve[:, None, None] * np.eye(3) for curve in _curves(observed)]
     sigma = [TYPICAL[sensor]] * 3
     return [(None, one, sigma) if sensor else (one, None, sigma) for one in each]
 
