@@ -62,6 +62,7 @@ pub fn sharpened(readings: &[[f64; 3]], time: &[f64], a: f64) -> Vec<[f64; 3]> {
 }
 
 /// First samples behind gaps in the timestamps.
+#[must_use]
 pub fn behind_gaps(time: &[f64], step_s: f64) -> Vec<usize> {
     let is_gap = |&k: &usize| time[k] - time[k - 1] > GAP * step_s;
     (1..time.len()).filter(is_gap).collect()

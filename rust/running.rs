@@ -17,6 +17,31 @@ pub fn running_median(values: &[f64], size: usize) -> Vec<f64> {
     out
 }
 
+/// Running mean square, over `width` (odd) rows, of what their least-squares parabola leaves of the row in the middle;
+/// beyond the ends the last row is repeated. Zero of fewer rows.
+#[must_use]
+pub fn roughness(rows: &[[f64; 3]], width: usize) -> Vec<[f64; 3]> {
+    let (n, half) = (rows.len(), width / 2);
+    if n < width {
+        return vec![[0.0; 3]; n];
+    }
+    let m = half as f64;
+    let size = (2.0 * m - 1.0) * (2.0 * m + 1.0) * (2.0 * m + 3.0) / 3.0;
+    let weight = |j: usize| (3.0 * m * (m + 1.0) - 1.0 - 5.0 * (j as f64 - m).powi(2)) / size;
+    let weights: Vec<f64> = (0..width).map(weight).collect();
+    let beside = |k: usize, j: usize| (k + j).saturating_sub(half).min(n - 1);
+    let left = |k: usize, c: usize| {
+        let smooth: f64 = (0..width).map(|j| weights[j] * rows[beside(k, j)][c]).sum();
+        (rows[k][c] - smooth).powi(2)
+    };
+    let squares: Vec<[f64; 3]> = (0..n).map(|k| [0, 1, 2].map(|c| left(k, c))).collect();
+    let mean = |k: usize, c: usize| {
+        let sum: f64 = (0..width).map(|j| squares[beside(k, j)][c]).sum();
+        sum / width as f64
+    };
+    (0..n).map(|k| [0, 1, 2].map(|c| mean(k, c))).collect()
+}
+
 /// Medians of the windows from the one about number `first` on.
 fn medians_from(values: &[f64], half: usize, first: usize, out: &mut [f64]) {
     let n = values.len();

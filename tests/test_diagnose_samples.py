@@ -36,7 +36,8 @@ def test_the_bias_of_a_gyro_that_noise_does_not_dither_is_as_uncertain_as_its_ls
     calibration = trihedron.calibrate(coarse, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(coarse, trihedron.segment(coarse), calibration.averaging)
     assert obs.undithered.all()
-    covariance, bias = hypothesis(obs, start_state(obs, calibration), None, within=noise_bounds(obs)).fitted.linear
+    fitted = hypothesis(obs, start_state(obs, calibration), None, within=noise_bounds(obs)).fitted
+    covariance, bias = fitted.core.linear_covariance(obs.force_origin, obs.rate_origin)
     error = bias - unit_of(hand_session(24, layout=2), 2).gyroscope.b
     # With a rounding error of its own in every pose these were 3.8, 0.7 and 2.8 σ.
     assert (np.abs(error) < 2.5 * np.sqrt(np.diag(covariance)[-3:])).all()

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import convolve1d, uniform_filter1d
 
 from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray
@@ -242,20 +241,12 @@ class Context:
         """
         obs, S, poses = self.obs, self.fitted.state.accel_S, self.pose_power
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
-        # Weights of the least-squares parabola at the middle of the window (Savitzky-Golay filter).
-        parabola = np.linalg.pinv(np.vander(np.arange(width) - width // 2, 3))[2]
-
-        def rough(force: FloatArray) -> FloatArray:
-            if len(force) < width:
-                return np.zeros_like(force)
-            away = force - convolve1d(force, parabola, axis=0, mode="nearest")
-            return np.asarray(uniform_filter1d(away**2, width, axis=0, mode="nearest"))
-
         spans = obs.segments.spans.tolist()
-        inside = np.array([rough(obs.raw_force[start:stop] @ S.T).mean(axis=0) for start, stop in spans])
+        still = (_core.roughness(obs.raw_force[start:stop] @ S.T, width) for start, stop in spans)
+        inside = np.array([power.mean(axis=0) for power in still])
         quiet, floor = (power.min(axis=0) for power in (inside, poses))
         passed = np.clip((inside - quiet).sum() / max(float((poses - floor).sum()), TINY), 0.1, 1.0)
-        in_moves = [(rough(self.force[where]) - quiet) / passed for where in self.moves]
+        in_moves = [(_core.roughness(self.force[where], width) - quiet) / passed for where in self.moves]
         return np.asarray(np.maximum(np.concatenate([poses - floor, *in_moves]), 0.0))
 
     def between_poses(self, per_pose: FloatArray) -> FloatArray:
@@ -275,21 +266,7 @@ class Context:
 
         Poses that no chain of moves reaches have NaN but for the vertical, which gravity shows.
         """
-        obs, up, out = self.obs, self.fitted.state.up, self.turned.copy()
-
-        def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
-            x = x_guess - up * (up @ x_guess)
-            x /= np.linalg.norm(x)
-            return np.stack([x, np.cross(up, x), up], axis=1)
-
-        out[: obs.n_poses] = np.nan
-        out[: obs.n_poses, :, 2] = up
-        out[0] = levelled(np.eye(3)[np.abs(up[0]).argmin()], up[0])
-        for where, (before, after) in zip(self.moves, obs.move_poses, strict=True):
-            out[where] = out[where] @ out[before]
-            if np.isfinite(out[before]).all():
-                out[after] = levelled(out[where.stop - 1][:, 0], up[after])
-        return out
+        return self.fitted.core.attitude()
 
     @cached_property
     def noise_density(self) -> FloatArray:

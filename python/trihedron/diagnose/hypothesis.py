@@ -13,7 +13,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, ROW_UNITS, physical_rms
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import Distortion, Fit, solved, stacked
+from trihedron.diagnose.session.solve import Distortion, Fit, folds, solved, stacked
 from trihedron.records.domains import HeldOut
 from trihedron.session.model import DYNAMICS, MOVES, NOTHING, STATIC_ACCEL, STATIC_GYRO, Prior, SessionState
 from trihedron.session.noise import ANYTHING, START_STRENGTHS, Bounds, Strengths, strengths_of_all
@@ -133,10 +133,16 @@ class Hypothesis:
 
     @cached_property
     def held_out(self) -> dict[int, tuple[float, float]]:
-        """Held-out rms [SI] and chi-square per row of every domain that has rows."""
-        chi2, n_rows, innovation = self.fitted.held_out
-        rms = physical_rms(self.fitted, innovation)
-        return {d: (rms[d], float(chi2[d] / n_rows[d])) for d in rms if n_rows[d] > 0.0}
+        """Rms [SI] and χ² per row of every domain that has rows, of blocks of poses or moves predicted from all others
+        (blocked cross-validation, eq. 11.15). The rms is of innovations over each row's own noise alone, so that a
+        model with a wider prediction does not look better in physical units.
+
+        The training rows do not determine the vertical and biases of a held-out pose. A weak prior (its column scale)
+        makes them finite; it is the same for every model that is compared.
+        """
+        chi2, _, n_rows, _, innovation = self.fitted.core.held_out(folds(self.fitted))
+        rms, each = physical_rms(self.fitted, innovation), chi2.sum(axis=0)
+        return {d: (rms[d], float(each[d] / n_rows[d])) for d in rms if n_rows[d] > 0.0}
 
     @cached_property
     def without(self) -> tuple[Hypothesis, ...]:

@@ -14,6 +14,9 @@ from trihedron.records.presented import Presented
 
 LEAST_POSE_S = 1.0
 """A hand that hesitates stops for a few tenths of a second; an intended pose lasts a second or more."""
+SAME_POSE_RAD, LEAST_SHARE = 0.12, 0.04
+"""Angle below which static means have one orientation (7°): a bias that drifts by 0.1 g turns the force by less; and
+the share of them below which an orientation is handling."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records import Pose, Recording, Segments
-from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
+from trihedron.records.segments import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.session.rounding import UNIFORM
 from trihedron.transforms import directions_of
 

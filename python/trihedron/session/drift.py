@@ -16,9 +16,6 @@ SLOW_S = (2.0, 6.0, 20.0, 60.0)
 pose is static, slower ones last for ten poses."""
 LEAST_SWING_K = 0.2
 """A logged temperature that changes by less is not used: the resolution of on-chip thermometers is 0.002 to 0.1 °C."""
-SAME_POSE_RAD, LEAST_SHARE = 0.12, 0.04
-"""Angle below which static means have one orientation (7°): a bias that drifts by 0.1 g turns the force by less; and
-the share of them below which an orientation is handling."""
 WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)
 """Time constants tried, as fractions of the recording: faster ones concern one or two poses, slower are a line."""
 

@@ -12,8 +12,6 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.rounding import rounding_of_moves
 
-LEAST_SHARE = 1e-9
-"""Least error of a pose mean over the largest reading, for logs without scatter (a simulation without noise)."""
 Pair = tuple[float, float]
 Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair]
 """Corner times of walks [s], scatter from pose to pose in its units (accelerometer, gyro by axis), departure in moves
@@ -107,7 +105,8 @@ def measure_noise(
     ):
         raise InputError("the segments state no uncertainty of their pose means")
     step_s = 1.0 / recording.rate_hz
-    floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), TINY)
+    # For logs without scatter (a simulation without noise): the square of a smaller share is lost beside one.
+    floor = np.sqrt(np.finfo(np.float64).eps) * max(float(np.abs(segments.accelerometer_mean).max()), TINY)
     force_sigma = np.maximum(segments.accelerometer_sigma_mean, floor)
     force_density = np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s)
     spans, rate_sigma, rate_density, of_rate = segments.spans, None, None, 0.0

@@ -10,7 +10,9 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::evidence::{Answer, Candidate, Glance, seen, tuned};
-use super::read_out::{Path, Shares, flagged, labels, moves, path, shares_of, stacked};
+use super::read_out::{
+    Blocks, Path, Rows, Shares, attitude, flagged, labels, moves, path, shares_of, stacked,
+};
 use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
 use crate::python::arrays::{matrix, of3, vector3, vectors};
@@ -144,12 +146,13 @@ impl SessionFit {
         path(py, &self.session, &self.fit)
     }
 
+    /// `(points, 3, 3)` local level (z up, any azimuth) → body; NaN but for the vertical where no chain of moves leads.
+    fn attitude<'py>(&self, py: Python<'py>) -> PyResult<Blocks<'py>> {
+        attitude(py, &self.session, &self.fit)
+    }
+
     /// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise.
-    #[allow(clippy::type_complexity)]
-    fn moves<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+    fn moves<'py>(&self, py: Python<'py>) -> PyResult<(Rows<'py>, Blocks<'py>)> {
         moves(py, &self.fit)
     }
 
@@ -161,16 +164,12 @@ impl SessionFit {
 
     /// `(moves, 5, 5)` whitening of the moves' residuals, without the weights of heavy tails.
     fn whitening<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let flat: Vec<f64> = self
-            .fit
-            .weights
-            .white
-            .iter()
-            .zip(&self.fit.weights.tail)
+        let weights = &self.fit.weights;
+        let each = weights.white.iter().zip(&weights.tail);
+        let flat: Vec<f64> = each
             .flat_map(|(white, tail)| (white.transpose() / tail.sqrt()).as_slice().to_vec())
             .collect();
-        flat.to_pyarray(py)
-            .reshape([self.fit.weights.white.len(), 5, 5])
+        flat.to_pyarray(py).reshape([weights.white.len(), 5, 5])
     }
 
     /// `(moves, 5)` residuals of the moves, whitened by the noise that was predicted for them before it was widened.

@@ -72,6 +72,34 @@ pub(super) fn path<'py>(py: Python<'py>, session: &Session, fit: &Fit) -> PyResu
     ))
 }
 
+/// `(points, 3, 3)` local level (z up, any azimuth) → body, rotated by the gyro in moves, levelled in poses.
+///
+/// Poses that no chain of moves reaches have NaN but for the vertical, which gravity shows.
+pub(super) fn attitude<'py>(
+    py: Python<'py>,
+    session: &Session,
+    fit: &Fit,
+) -> PyResult<Blocks<'py>> {
+    let up = &fit.state.up;
+    let levelled = |near: Vector3<f64>, up: &Vector3<f64>| {
+        let x = (near - up * up.dot(&near)).normalize();
+        Matrix3::from_columns(&[x, up.cross(&x), *up])
+    };
+    let nowhere = Vector3::repeat(f64::NAN);
+    let unknown = |up: &Vector3<f64>| Matrix3::from_columns(&[nowhere, nowhere, *up]);
+    let mut out: Vec<Matrix3<f64>> = up.iter().map(unknown).collect();
+    out[0] = levelled(Vector3::ith(up[0].iamin(), 1.0), &up[0]);
+    for (one, of) in fit.passed.iter().zip(session.moves.iter()) {
+        let begin = out[of.before];
+        out.extend(one.carried.attitude.iter().map(|turn| turn * begin));
+        let x: Vector3<f64> = out[out.len() - 1].column(0).into();
+        if begin[(0, 0)].is_finite() {
+            out[of.before + 1] = levelled(x, &up[of.before + 1]);
+        }
+    }
+    stack3(py, out.into_iter())
+}
+
 /// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise covariance.
 pub(super) fn moves<'py>(py: Python<'py>, fit: &Fit) -> PyResult<(Rows<'py>, Blocks<'py>)> {
     let m = fit.passed.len();

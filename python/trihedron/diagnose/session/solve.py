@@ -108,29 +108,9 @@ class Fit:
         """(poses, 3) biases of the accelerometer (0) or the gyro (1), SI."""
         return (self.state.accel_bias, self.state.gyro_bias)[sensor]
 
-    @cached_property
-    def held_out(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """χ² (domains,) and number of rows (domains,) of blocks of poses or moves predicted from all others (blocked
-        cross-validation, eq. 11.15), and innovations (rows,) over each row's own noise alone, so that a model with a
-        wider prediction does not look better in physical units.
-
-        The training rows do not determine the vertical and biases of a held-out pose. A weak prior (its column scale)
-        makes them finite; it is the same for every model that is compared.
-        """
-        chi2, _, n_rows, _, innovation = self.core.held_out(folds(self))
-        return chi2.sum(axis=0), n_rows, innovation
-
     def covariance(self) -> FloatArray:
         """(18 + effects, same) covariance of the shared unknowns: S_a lower, b_a, S_w on centred readings, effects."""
         return self.core.border_covariance()
-
-    @cached_property
-    def linear(self) -> tuple[FloatArray, FloatArray]:
-        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings, and ``b_w`` with one bias for the session.
-
-        It includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
-        """
-        return self.core.linear_covariance(self.obs.force_origin, self.obs.rate_origin)
 
 
 def solved(

@@ -115,10 +115,11 @@ def _rate_of_count(recording: Recording, segments: Segments) -> float:
 def linear_model(fitted: Fit) -> LinearModel:
     """S, b of both sensors from a fitted session, on raw readings, with one bias for the session.
 
-    With the full covariance of its parameters, in the order of a calibration file: S row by row, then b (eq. 11.16).
+    With the full covariance of its parameters, in the order of a calibration file: S row by row, then b (eq. 11.16). It
+    includes bias scatter from pose to pose, as that of a calibration does (eq. 11.12b).
     """
     state, obs, recording = fitted.state, fitted.obs, fitted.obs.recording
-    covariance, gyro_b = fitted.linear
+    covariance, gyro_b = fitted.core.linear_covariance(obs.force_origin, obs.rate_origin)
     accel_b = fitted.core.session_force_bias - state.accel_S @ obs.force_origin
     accel_unit, gyro_unit = recording.accelerometer_unit.value, recording.gyroscope_unit.value
     accel = SensorCalibration(state.accel_S, accel_b, covariance[:12, :12], accel_unit, "m/s^2", "diagnosis")

@@ -20,7 +20,7 @@ from trihedron.channel_facts.static_axes import adc_step
 from trihedron.probability import RARE_ALARM
 from trihedron.quantiles import MAD_TO_SIGMA
 from trihedron.ranges import edges_of, merged
-from trihedron.session.drift import LEAST_SHARE, SAME_POSE_RAD
+from trihedron.records.segments import LEAST_SHARE, SAME_POSE_RAD
 from trihedron.transforms import directions_of
 
 READOUT_SAMPLE = 200_000

@@ -48,8 +48,7 @@ class Observed(SessionReadings):
     pose_rate: FloatArray
     moves: _core.SessionMoves
     before: IntArray
-    sigma_time_s: float
-    nominal_step_s: float
+    timing_s: tuple[float, float]
     force_effect: FloatArray
     rate_effect: FloatArray
     effect_sigma: FloatArray
@@ -68,8 +67,7 @@ class Observed(SessionReadings):
 
     def model(self) -> _core.SessionModel:
         """The Rust model; bias repeatability from pose to pose is not bounded, but determined by the evidence."""
-        timing_s = self.sigma_time_s, self.nominal_step_s
-        return self.core_model(self.gravity_m_s2, self.moves, timing_s, self.prior)
+        return self.core_model(self.gravity_m_s2, self.moves, self.timing_s, self.prior)
 
 
 def arranged(
@@ -79,10 +77,8 @@ def arranged(
     """Arrange the poses and the moves ``used`` (m,) for the core; one static sample on either side brackets a move."""
     assert recording.accelerometer is not None
     assert recording.gyroscope is not None
-    n = recording.n_samples
+    n, rows, readings = recording.n_samples, measured.rows, measured.force
     force_origin, rate_origin = measured.reading.mean(axis=0), measured.bias_read.mean(axis=0)
-    rows = measured.rows
-    readings = measured.force
     ranges: list[tuple[int, int]] = []
     before = []
     for (start, stop), (pose, after), is_used in zip(measured.edges, measured.links, used, strict=True):
@@ -101,17 +97,13 @@ def arranged(
     # Variance of rounding and of bridged clipping, in addition to that of any session.
     for k, (a, b) in enumerate(ranges):
         unresolved[k, 3] += measured.reading_variance[a:b].sum(axis=0) * measured.nominal_step_s**2
-    pose_time_s = np.ascontiguousarray(segments.time_mid_s, dtype=np.float64)
+    pose_time_s = segments.time_mid_s
     # Undithered readings: noise and drift; the position of the bias inside the LSB is a column.
     is_coarse, coarse = measured.is_undithered, np.flatnonzero(measured.is_undithered)
     lasts_s = np.array([pose.stop - pose.start for pose in segments.poses]) * measured.nominal_step_s
     of_coarse = np.sqrt(measured.var_bias + measured.noise_density**2 / lasts_s[:, None])
-    # Without dither the rounding error does not average out: the larger of both standard errors is used.
     own = {
-        "pose_force_sigma": np.maximum(noise.pose_force_sigma, np.sqrt(measured.var_reading_noise)),
-        "pose_rate_sigma": np.where(
-            is_coarse, of_coarse, np.maximum(noise.pose_rate_sigma, np.sqrt(measured.var_bias_read))
-        ),
+        "pose_rate_sigma": np.where(is_coarse, of_coarse, noise.pose_rate_sigma),
         "rate_density": np.where(is_coarse, measured.noise_density, noise.rate_density),
     }
     edges, moves_before = np.array(ranges, dtype=np.int64), np.array(before, dtype=np.int64)
@@ -143,7 +135,7 @@ def arranged(
         **(vars(noise) | own), gravity_m_s2=gravity_m_s2, force_origin=force_origin, rate_origin=rate_origin,
         pose_time_s=pose_time_s, pose_force=measured.reading - force_origin,
         pose_rate=pose_rate - rate_origin, moves=moves,
-        before=moves_before, sigma_time_s=measured.sigma_time_s, nominal_step_s=measured.nominal_step_s,
+        before=moves_before, timing_s=(measured.sigma_time_s, measured.nominal_step_s),
         force_effect=effects[0], rate_effect=effects[1],
         effect_sigma=np.array([
             *measured.quantum[coarse] * np.sqrt(UNIFORM), EITHER, *np.ones(measured.shared_errors.shape[2]), DELAY_S,
