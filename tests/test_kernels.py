@@ -337,3 +337,15 @@ def test_every_number_is_the_double_nearest_to_its_digits(separator, ends):
 @pytest.mark.parametrize("text", [*DAMAGED, *NO_NUMBERS])
 def test_anything_else_is_no_plain_table(text):
     assert columns_of(text, ",", 2) is None
+
+
+def test_the_roughness_of_a_motion_is_what_a_running_least_squares_parabola_leaves():
+    from scipy.ndimage import convolve1d, uniform_filter1d
+
+    width, motion = 25, np.random.default_rng(5).normal(size=(200, 3))
+    middle = np.linalg.pinv(np.vander(np.arange(width) - width // 2, 3))[2]
+    away = motion - convolve1d(motion, middle, axis=0, mode="nearest")
+    expected = uniform_filter1d(away**2, width, axis=0, mode="nearest")
+    # Sums of 25 terms, each rounded.
+    np.testing.assert_allclose(_core.roughness(motion, width), expected, rtol=1e-12)
+    assert not _core.roughness(motion[: width - 1], width).any()
