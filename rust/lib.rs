@@ -11,6 +11,7 @@ pub mod audit;
 pub mod autoregression;
 pub mod before_adc;
 pub mod block_motion;
+pub mod channel_slope;
 pub mod chi_square;
 pub mod ellipsoid;
 pub mod error;

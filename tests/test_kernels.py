@@ -9,7 +9,6 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from trihedron import _core, probability
-from trihedron.diagnose.slope import smoothed_slope
 
 RNG = np.random.default_rng(20261)
 TIME = np.cumsum(RNG.uniform(0.008, 0.012, 90))
@@ -147,7 +146,7 @@ def test_a_slope_that_turns_within_a_few_widths_keeps_its_size(width, noise):
     time = np.arange(20_000) / 100.0
     values = 4.0 * np.sin(2.0 * np.pi * time / 40.0) + np.random.default_rng(2).normal(0.0, noise, len(time))
     # A temperature in tenths of a kelvin where it is noisy.
-    found = smoothed_slope(np.round(values, 1) if noise else values, time, width)
+    found = _core.channel_slope(np.round(values, 1) if noise else values, time, width / 2.5)
     asked = 0.2 * np.pi * np.cos(2.0 * np.pi * time / 40.0)
     # One Gaussian of 2.5 s takes 7 % off; both, (2π 2.5/40)⁴/2.
     assert np.abs(found - asked)[2000:-2000].max() < 0.015 * np.abs(asked).max()

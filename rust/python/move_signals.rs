@@ -1,17 +1,20 @@
 //! Bindings of the regressors of effects.
 
 use numpy::{
-    PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, as_vectors, flat1, flat3, matrix3, of3, vector3};
-use crate::move_signals;
 use crate::scale_from_moves::Moves;
+use crate::channel_slope::slope;
+use crate::move_signals;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(play, module)?)?;
+    module.add_function(wrap_pyfunction!(channel_slope, module)?)?;
     module.add_function(wrap_pyfunction!(move_derivative, module)?)?;
     module.add_function(wrap_pyfunction!(move_shifted, module)?)?;
     module.add_function(wrap_pyfunction!(scale_from_moves, module)?)?;
@@ -35,6 +38,23 @@ fn play<'py>(
     let flat = flat3("path", &path)?;
     let out = super::run(py, || Ok(move_signals::play(&flat, 3, half_width)))?;
     out.to_pyarray(py).reshape([path.shape()[0], 3])
+}
+
+/// Rate of change per second `(n,)` of a channel `(n,)` at its times, `rate_hz` of them in a second; finite values only.
+#[pyfunction]
+fn channel_slope<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f64>,
+    time_s: PyReadonlyArray1<'py, f64>,
+    rate_hz: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (values, time) = (flat1(&values), flat1(&time_s));
+    if values.len() != time.len() || !(rate_hz.is_finite() && rate_hz > 0.0) {
+        let said = "a channel has as many times as values, and a positive rate";
+        return Err(PyValueError::new_err(said));
+    }
+    let out = super::run(py, || Ok(slope(&values, &time, rate_hz)))?;
+    Ok(out.to_pyarray(py))
 }
 
 /// Ranges `(m, 2)` of moves inside `n` points.

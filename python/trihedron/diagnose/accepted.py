@@ -24,10 +24,6 @@ from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.records.words import words
 from trihedron.session.model import misfits
 
-HEADLINE = 0.5
-"""Share of the misfit below which an effect of single samples or poses (a faint line, one disturbed pose) does not
-state why a recording disagrees."""
-
 
 @dataclass(frozen=True, eq=False)
 class Answer:
@@ -99,7 +95,8 @@ class Answer:
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False
         is_faint = [own is not None or effect.is_minor or effect.id in self.beside for effect, _, own in self.gains]
-        is_reason = [share >= HEADLINE or not faint for share, faint in zip(self.shares, is_faint, strict=True)]
+        # One of single samples or poses says why if it explains more than everything else does.
+        is_reason = [share >= 1.0 - share or not faint for share, faint in zip(self.shares, is_faint, strict=True)]
         return any(is_reason) and not all(effect.is_minor for effect, *_ in self.gains)
 
 

@@ -22,13 +22,12 @@ from trihedron.records.words import Words
 from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
 from trihedron.threads import side_by_side
 
-DRIFT_CORNER_S = 2.0 * NOISE_CORNER_S
-"""Corner time of a walk that twenty poses in some minutes do not show: half an error of a pose. A smooth drift of 12
-errors is likely as a walk with the corner time of the noisiest parts; that it exceeds 1/f noise its size shows:"""
 FLICKER_WITHIN = 2.0
-"""Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small; and rms of a
-drifting bias over the poses, in standard errors of a pose mean, above which the drift is named: 1/f noise drifts too,
-up to 1.63 with 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
+"""Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small; corner time, in
+that of the noisiest parts, of a walk that twenty poses in some minutes do not show: half an error of a pose, where a
+smooth drift of 12 errors is likely as a walk with theirs; and rms of a drifting bias over the poses, in standard errors
+of a pose mean, above which the drift is named: 1/f noise drifts too, up to 1.63 with 0.3 mg
+(benches/blind_nuisances.py --stress flicker)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +96,8 @@ def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
     """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains, that of
     a walk to what poses do not show."""
     corner, scatter, excess = _bounded(model.obs, model.within, {(effect.sensor, effect.walks)})
-    accel, gyro = (max(c, DRIFT_CORNER_S) if effect.walks and s == effect.sensor else c for s, c in enumerate(corner))
+    least = FLICKER_WITHIN * NOISE_CORNER_S
+    accel, gyro = (max(c, least) if effect.walks and s == effect.sensor else c for s, c in enumerate(corner))
     return (accel, gyro), scatter, excess
 
 

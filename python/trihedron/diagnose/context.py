@@ -10,7 +10,6 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.slope import slope_of
 from trihedron.sensor_model import axis_scales
 
 VIBRATION_WINDOW_S = 0.25
@@ -205,7 +204,9 @@ class Context:
     def temperature_rate(self) -> FloatArray | None:
         """(points,) rate of change of the logged temperature, K/s, smoothed as little as its thermometer allows."""
         recording, logged = self.obs.recording, self._logged("temperature_degc")
-        return None if logged is None else self.at_points(slope_of(self._filled(logged), recording))
+        if logged is None:
+            return None
+        return self.at_points(_core.channel_slope(self._filled(logged), recording.time_s, recording.rate_hz))
 
     @cached_property
     def supply(self) -> FloatArray | None:

@@ -32,15 +32,13 @@ class Side(NamedTuple):
     domain: Domain
 
 
-ACCELEROMETER, GYRO = 0, 1
 SENSORS = (
     Side("accelerometer", "accel", "accelerometer", "m/s^2", "static-accel"),
     Side("gyro", "gyro", "gyroscope", "rad/s", "static-gyro"),
 )
+ACCELEROMETER, GYRO = range(len(SENSORS))
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Prior widths tried, as factors on the data-sheet size of an effect: parts of a kind differ tenfold."""
-MOST_NAMED = 4
-"""Places of one kind that a sentence names: more do not fit a line."""
 SHAPE_NAMES = ("time_constant", "half_width", "pose", "thermometer_lag", "step_time")
 """Names of the shape parameters, which are nonlinear: chosen from a grid, refined at the maximum of the evidence."""
 

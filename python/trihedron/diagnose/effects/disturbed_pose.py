@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import MOST_NAMED, DirectEffect, Evidence, Variant, acting_on, per_axis
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence, Variant, acting_on, per_axis
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF
 from trihedron.diagnose.residuals.within_poses import loud_poses, pose_scatter
 from trihedron.diagnose.session.observations import LOUD, Observations
@@ -113,8 +113,8 @@ class DisturbedPose(DirectEffect):
         strength = 10.0 * (len(disturbed) + len(restless))
         names = list(dict.fromkeys(obs.pose_names(restless)))
         statement = self.reported(
-            "not-still", is_timed=bool(disturbed), disturbed_s=[(0.5 * (a + b),) for a, b in disturbed[:MOST_NAMED]],
-            is_restless=bool(restless), restless=names[:MOST_NAMED], are_both=bool(disturbed and restless),
+            "not-still", is_timed=bool(disturbed), disturbed_s=[(0.5 * (a + b),) for a, b in disturbed],
+            is_restless=bool(restless), restless=names, are_both=bool(disturbed and restless),
         )  # fmt: skip
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(

@@ -7,7 +7,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import MOST_NAMED, DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence
 from trihedron.diagnose.effects.saturation import clipped_samples
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Distortion, solved
@@ -113,11 +113,8 @@ class DroppedSamples(DirectEffect):
                 for one in losses
             ),
         )
-        largest = sorted(losses, key=lambda loss: -loss.count)[:MOST_NAMED]
-        statement = self.reported(
-            "losses", losses=[(loss.count, t[loss.sample]) for loss in largest],
-            has_more=len(losses) > MOST_NAMED, more=len(losses) - MOST_NAMED,
-        )  # fmt: skip
+        largest = sorted(losses, key=lambda loss: -loss.count)
+        statement = self.reported("losses", losses=[(loss.count, t[loss.sample]) for loss in largest])
         where = Where(
             (),
             tuple(dict.fromkeys(obs.move_names([loss.move for loss in losses]))),

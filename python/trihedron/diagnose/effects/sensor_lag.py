@@ -6,6 +6,7 @@ mean τ²/3, Butterworth's of second order 0. Columns are computed for a time of
 which must come out near one.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +18,8 @@ from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import CLEAR
 from trihedron.records.diagnosis import EffectParameter
 
-STEP = 4.0
-"""Ratio of the times tried; of those between, the columns are computed for the size found. A confirmed parameter is
-within the root of it from one: outside, another time of the grid fits better, or the mechanism does not."""
-TIMES_S = tuple(0.001 * STEP**k for k in (1, 2, 3))
+TIMES_S = (0.004, 0.016, 0.064)
+"""Times tried; of those between, the columns are computed for the size found."""
 SEPARATE, DELAYS, BOTH = "per axis", ", without smoothing", "smoothing_of_both"
 
 
@@ -40,8 +39,9 @@ class _Late(Effect):
         return sizes
 
     def is_plausible(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        sigma = CLEAR * float(sigmas_of(covariance)[0])
-        return bool(max(STEP**-0.5 - sigma, 0.0) < value[0] < STEP**0.5 + sigma)
+        # Farther than half-way to the next time, that one fits better, or the mechanism does not.
+        sigma, away = CLEAR * float(sigmas_of(covariance)[0]), math.sqrt(TIMES_S[1] / TIMES_S[0])
+        return bool(max(1.0 / away - sigma, 0.0) < value[0] < away + sigma)
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         lags = super().parameters(variant, value, covariance)

@@ -19,8 +19,8 @@ from trihedron.session.noise import FEWEST_READINGS
 MIN_LINE_SHARE = 0.03
 """Share of the variance below which a line is ignored: long poses resolve lines far below the noise that change no
 result."""
-N_TESTS = 3.0
-"""Lines, noisy poses and changes of noise."""
+TESTS = ("lines", "noisy poses", "changes of noise")
+"""They share the false-alarm rate of their domain."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +123,8 @@ def loud_poses(obs: Observations) -> FloatArray:
 
 
 def within_limit(alpha: float) -> float:
-    """Score (twice a log-likelihood) above which one of the three tests disagrees."""
-    return float(-2.0 * np.log(alpha / (N_TESTS * N_DOMAINS_TESTED)))
+    """Score (twice a log-likelihood) above which one of the tests disagrees."""
+    return float(-2.0 * np.log(alpha / (len(TESTS) * N_DOMAINS_TESTED)))
 
 
 def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
@@ -136,7 +136,7 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     lines = [line for line in find_lines(obs) if line.has_size]
     p_line = min((line.p_value for line in lines), default=1.0)
     changes = {one: float(np.exp(-0.5 * one.score)) for one in noise_changes(obs)}
-    p = min(1.0, N_TESTS * min(p_scatter, p_line, *changes.values()))
+    p = min(1.0, len(TESTS) * min(p_scatter, p_line, *changes.values()))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])
     weight = scatter.dof * steady if steady.any() else scatter.dof
     chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=weight).mean())

@@ -11,7 +11,7 @@ class EffectWords:
     ``mechanism`` completes "the model lacks this: ..."; ``experiment`` is the recording that separates it from other
     effects. ``said`` are sentences about the accepted effect by case, with placeholders for values
     (``report/findings/wording.py``); without one the sentence is the mechanism with its strongest term. ``lines`` are
-    the parts of placeholders ``{name:each}``.
+    the parts of placeholders ``{name:each}`` and ``{name:first 4}``.
     """
 
     mechanism: str
@@ -197,8 +197,8 @@ SESSION = {
         "samples are missing while the timestamps are even",
         "lower the rate or the load of the link; the sensor's own sample counter shows every loss",
         {
-            "losses": "Samples are missing while the timestamps are even: {losses:each}{has_more:? and {more} "
-            "smaller|} (a loss inside a static pose does not show).",
+            "losses": "Samples are missing while the timestamps are even: {losses:first 4} "
+            "(a loss inside a static pose does not show).",
         },
         lines={"losses": "{v0} at {v1:.2f} s"},
     ),
@@ -216,8 +216,8 @@ SESSION = {
         {
             "moved": "Pose {pose:.0f} was disturbed: its mean is off by {off:.2g} m/s²; repeat it, or cut its rows out "
             "of the log.",
-            "not-still": "Disturbed poses ({is_timed:?at {disturbed_s:each}|}{are_both:?; |}"
-            "{is_restless:?not still: {restless:&, }|}).",
+            "not-still": "Disturbed poses ({is_timed:?at {disturbed_s:first 4}|}{are_both:?; |}"
+            "{is_restless:?not still: {restless:first 4}|}).",
         },
         lines={"disturbed_s": "{v0:.2f} s"},
     ),

@@ -16,7 +16,7 @@ A placeholder is a name and, after the colon, the format of its value:
 ``clause``               a sentence inside another one
 ``opening``              its first clause alone
 ``unit``                 ``m/s²`` for ``m/s^2``
-``first 8``              ``3, 5, 6``, with ``and 4 more`` after the eighth
+``first 8``              ``3, 5, 6``, with ``and 4 more`` after the eighth; also of groups by the entry's line
 ``numbered``             several words as ``(1) ...; (2) ...``
 ``variables``            variables of an empirical relation, in words
 ``ids``                  ``gyro bias`` for ``gyro-bias``; several are listed, or as a further format says
@@ -28,7 +28,7 @@ A placeholder is a name and, after the colon, the format of its value:
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
@@ -102,7 +102,7 @@ def branches(how: str) -> tuple[str, str]:
 def _in_words(value: Any, how: str, line: str) -> str:
     if how == "run" or how.startswith("each"):
         between = "" if how == "run" else how[4:] or ", "
-        return between.join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
+        return between.join(filled(line, _numbered(group), {}) for group in value)
     if how == "quantity":
         number, *sigma, unit = value
         factor, printed = shown(unit)
@@ -141,12 +141,17 @@ def _in_words(value: Any, how: str, line: str) -> str:
     if how.startswith("&"):
         return how[1:].join(map(str, value))
     if how.startswith("first "):
-        most = int(how[6:])
+        most, value = int(how[6:]), [filled(line, _numbered(group), {}) for group in value] if line else value
         return ", ".join(map(str, value[:most])) + (f" and {len(value) - most} more" if len(value) > most else "")
     if how.startswith("# "):
         noun = how[2:]
         return f"{value:.0f} {noun if value == 1 else _plural(noun)}"
     return _number(value, how) if how else str(value)
+
+
+def _numbered(group: Sequence[Any]) -> dict[str, Any]:
+    """Values of a group by their names in a line."""
+    return {f"v{i}": v for i, v in enumerate(group)}
 
 
 def axis_name(axis: int | str) -> str:
