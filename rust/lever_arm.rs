@@ -36,6 +36,8 @@ const TOO_FLAT: f64 = 1e6;
 /// Eigenvalue of the normal equations, of the largest, below which a direction keeps 0: rotations about the vertical
 /// alone do not determine the delay.
 const NEGLIGIBLE: f64 = 1e-12;
+/// Window of the running mean of both sides of the comparison, s: angular acceleration is a difference of noisy rates.
+const SMOOTHED: f64 = 0.05;
 /// An arm, and a delay between the sensors beside it: turning gravity would imitate an arm.
 const UNKNOWNS: usize = 4;
 type Value = SVector<f64, UNKNOWNS>;
@@ -55,8 +57,8 @@ pub struct Motion<'a> {
     pub attitude: &'a [Matrix3<f64>],
     /// Half-open ranges of the moves.
     pub moves: &'a [[usize; 2]],
-    /// Samples of the running mean of both sides of the comparison: angular acceleration is a difference of noisy rates.
-    pub smoothed: usize,
+    /// Samples per second.
+    pub rate_hz: f64,
 }
 
 /// The arm, and what it explains.
@@ -150,9 +152,15 @@ fn written(motion: &Motion<'_>) -> Vec<Move> {
         .collect()
 }
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a number of samples"
+)]
 fn written_move(motion: &Motion<'_>, at: std::ops::Range<usize>, n_shapes: usize) -> Move {
+    let width = (SMOOTHED * motion.rate_hz).round_ties_even() as usize | 1;
     let smooth = |values: &[[f64; 3]]| -> Vec<[f64; 3]> {
-        let flat = rolling_mean(values[at.clone()].as_flattened(), 3, motion.smoothed);
+        let flat = rolling_mean(values[at.clone()].as_flattened(), 3, width);
         flat.as_chunks::<3>().0.to_vec()
     };
     let (rate, force, gravity) = (

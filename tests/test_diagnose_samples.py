@@ -9,7 +9,7 @@ import trihedron
 from diagnosed_session import diagnosed, simulated, unit_of
 from trihedron.diagnose.bias_strengths import noise_bounds
 from trihedron.diagnose.hypothesis import hypothesis
-from trihedron.diagnose.residuals.noise_level import noise_changes
+from trihedron.diagnose.residuals.within_poses import noise_changes
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_state
 from trihedron.simulate import hand_session, scenario_by_name, simulate, with_effect

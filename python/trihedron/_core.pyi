@@ -302,7 +302,7 @@ def lever_arm_of_moves(
     attitude: FloatArray,
     moves: npt.NDArray[np.int64],
     *,
-    smoothed: int,
+    rate_hz: float,
     fewest: int,
 ) -> tuple[FloatArray, FloatArray, float, tuple[float, float], int] | None: ...
 

@@ -23,7 +23,7 @@ type Found<'py> = (
 /// moves held out, and the number of moves; `None` where they do not determine it. `motion` is time `(n,)`, rate, force
 /// and minus gravity `(n, 3)`, `attitude` `(n, 3, 3)` the rotation since each of the `moves` `(m, 2)` began.
 #[pyfunction]
-#[pyo3(signature = (motion, attitude, moves, *, smoothed, fewest))]
+#[pyo3(signature = (motion, attitude, moves, *, rate_hz, fewest))]
 fn lever_arm_of_moves<'py>(
     py: Python<'py>,
     motion: (
@@ -34,7 +34,7 @@ fn lever_arm_of_moves<'py>(
     ),
     attitude: PyReadonlyArray3<'py, f64>,
     moves: PyReadonlyArray2<'py, i64>,
-    smoothed: usize,
+    rate_hz: f64,
     fewest: usize,
 ) -> PyResult<Option<Found<'py>>> {
     let time = flat1(&motion.0);
@@ -51,7 +51,7 @@ fn lever_arm_of_moves<'py>(
             gravity: as_rows(&gravity),
             attitude: &attitude,
             moves: &moves,
-            smoothed,
+            rate_hz,
         };
         lever_arm::arm(&motion, fewest)
     })?;

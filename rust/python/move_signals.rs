@@ -8,9 +8,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{as_rows, as_vectors, flat1, flat3, matrix3, of3, vector3};
-use crate::scale_from_moves::Moves;
 use crate::channel_slope::slope;
 use crate::move_signals;
+use crate::scale_from_moves::Moves;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(play, module)?)?;

@@ -71,11 +71,6 @@ class Answer:
         return [max(gain, 0.0) / whole if own is None else own for _, gain, own in self.gains]
 
     @property
-    def beside(self) -> set[str]:
-        """Ids of effects seen in the samples that change no observation (no gaps of time, no moves excluded)."""
-        return {key for key, one in self.seen.items() if one.reweigh is None}
-
-    @property
     def says_why(self) -> bool:
         """Whether a mechanism was accepted, not a scatter or a disturbed pose alone, and an effect that is not minor: a
         faint line, or one of the samples that changes nothing in the fit; and relations explain less than the
@@ -94,7 +89,9 @@ class Answer:
         )
         if sum(one.score for one in self.found.related.relations) > of_instrument:
             return False
-        is_faint = [own is not None or effect.is_minor or effect.id in self.beside for effect, _, own in self.gains]
+        # What is seen in the samples and changes no observation: no gaps of time, no moves excluded.
+        beside = {key for key, one in self.seen.items() if one.reweigh is None}
+        is_faint = [own is not None or effect.is_minor or effect.id in beside for effect, _, own in self.gains]
         # One of single samples or poses says why if it explains more than everything else does.
         is_reason = [share >= 1.0 - share or not faint for share, faint in zip(self.shares, is_faint, strict=True)]
         return any(is_reason) and not all(effect.is_minor for effect, *_ in self.gains)

@@ -138,8 +138,10 @@ def _of_term(
     if isinstance(effect, BiasDrift):
         along = np.asarray(term.distortion.rate)[: obs.n_poses]
         sigma = np.sqrt(np.einsum("nik,kl,nil->ni", along, covariance, along)).max(axis=0)
-        span, is_counts = np.ptp(along @ value, axis=0), unit == "counts"
-        parameters, statement = effect.of_curve(term.variant, span, np.sqrt(2.0) * sigma, is_counts=is_counts)
+        span = np.ptp(along @ value, axis=0)
+        parameters, statement = effect.of_strength(
+            span, np.sqrt(2.0) * sigma, is_counts=unit == "counts", variant=term.variant
+        )
         series = series_of(obs, along @ value, sigma, unit)
     said = parameters, statement, p_value, found.scores[k]
     return effect_record(effect, *said, held, rivals, curves, **series), p_value, parameters

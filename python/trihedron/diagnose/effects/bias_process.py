@@ -123,22 +123,13 @@ class BiasDrift(BiasProcess):
         return float(np.ptp(drift, axis=1).max(initial=0.0)) < 2.0 / PRIOR_SCALES[-1] * self.typical
 
     def of_strength(
-        self, size: FloatArray, std: FloatArray, *, is_counts: bool = False
+        self, size: FloatArray, std: FloatArray, *, is_counts: bool = False, variant: Variant | None = None
     ) -> tuple[tuple[EffectParameter, ...], Words]:
-        """Parameters and sentence of a random walk; readings of a log of one orientation may be counts of unknown
-        scale."""
-        said = self.reported("walk", range=size, is_counts=is_counts)
-        return per_axis_parameters("range", size, std, self.unit), said
-
-    def of_curve(
-        self, variant: Variant, size: FloatArray, std: FloatArray, *, is_counts: bool
-    ) -> tuple[tuple[EffectParameter, ...], Words]:
-        """The same of a step or a smooth curve in such a log."""
-        if variant.label == STEP:
-            at_s, _ = variant.shape[STEP_TIME]
-            said = self.reported("step", range=size, step_time=at_s, is_counts=is_counts)
-        else:
-            said = self.reported("static", range=size, is_counts=is_counts)
+        """Parameters and sentence of a random walk, or of the step or curve of a ``variant``; readings of a log of one
+        orientation may be counts of unknown scale."""
+        kind = "walk" if variant is None else STEP if variant.label == STEP else "static"
+        shape = {} if variant is None else {name: value for name, (value, _) in variant.shape.items()}
+        said = self.reported(kind, range=size, is_counts=is_counts, **shape)
         return per_axis_parameters("range", size, std, self.unit), said
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:

@@ -4,7 +4,7 @@ To add one: write a file in this folder with a subclass of :class:`Effect` and n
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -145,10 +145,7 @@ class Effect:
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         """Physical parameters from the linear ones, then the shape parameters with ``shape_sigma`` as uncertainty."""
         sigma = abs(variant.scale) * sigmas_of(covariance)
-        linear = tuple(
-            EffectParameter(name, variant.scale * float(v), float(s), unit)
-            for name, v, s, unit in zip(variant.names, value, sigma, variant.units, strict=True)
-        )
+        linear = measured(variant.names, variant.scale * value, sigma, variant.units)
         shape = tuple(EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items())
         return linear + shape
 
@@ -205,6 +202,14 @@ class DirectEffect(Effect):
         """The evidence for the effect in this recording, or ``None``."""
 
 
+def measured(
+    names: Sequence[str], value: FloatArray, std: FloatArray, units: Sequence[str]
+) -> tuple[EffectParameter, ...]:
+    """Parameters from values (k,) and their standard uncertainties (k,)."""
+    each = zip(names, value, std, units, strict=True)
+    return tuple(EffectParameter(name, float(v), float(s), unit) for name, v, s, unit in each)
+
+
 def per_axis(symbol: str) -> tuple[str, ...]:
     """Names of one parameter per axis."""
     return tuple(f"{symbol}_{axis}" for axis in AXES)
@@ -212,8 +217,7 @@ def per_axis(symbol: str) -> tuple[str, ...]:
 
 def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: str) -> tuple[EffectParameter, ...]:
     """One parameter per axis, from sizes (3,) and their standard uncertainties (3,)."""
-    named = zip(per_axis(symbol), size, std, strict=True)
-    return tuple(EffectParameter(name, float(v), float(s), unit) for name, v, s in named)
+    return measured(per_axis(symbol), size, std, (unit,) * 3)
 
 
 def acting_on(sensor: int, columns: FloatArray) -> Distortion:

@@ -108,10 +108,7 @@ class DroppedSamples(DirectEffect):
         parameters = (
             EffectParameter("events", float(len(losses)), 0.0, "1"),
             EffectParameter("samples_lost", float(sum(loss.count for loss in losses)), total, "1"),
-            *(
-                EffectParameter(f"lost_at_{t[one.sample]:.2f}s", float(one.count), one.sigma, "samples")
-                for one in losses
-            ),
+            *(EffectParameter(f"lost_at_{t[k.sample]:.2f}s", float(k.count), k.sigma, "samples") for k in losses),
         )
         largest = sorted(losses, key=lambda loss: -loss.count)
         statement = self.reported("losses", losses=[(loss.count, t[loss.sample]) for loss in largest])

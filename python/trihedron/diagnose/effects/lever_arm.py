@@ -15,8 +15,6 @@ from trihedron.session.noise import FEWEST_POSES
 
 P_LIMIT = 1e-5
 """False-alarm rate of Hotelling's test: the travel of a hand follows the rotation by chance (rust/lever_arm.rs)."""
-SMOOTHED_S = 0.05
-"""Window of the mean applied to both sides, s: angular acceleration is a difference of noisy rates."""
 
 
 class LeverArm(DirectEffect):
@@ -36,8 +34,7 @@ class LeverArm(DirectEffect):
         moves = [(where.start, where.stop) for where in _true_moves(context)]
         found = _core.lever_arm_of_moves(
             (context.time_s, context.rate, context.force, context.gravity_in_moves), context.turned,
-            np.array(moves),
-            smoothed=round(SMOOTHED_S * context.obs.recording.rate_hz) | 1, fewest=FEWEST_POSES,
+            np.array(moves), rate_hz=context.obs.recording.rate_hz, fewest=FEWEST_POSES,
         )  # fmt: skip
         if found is None:
             return None

@@ -13,7 +13,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, sigmas_of
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, on_axes
+from trihedron.diagnose.effects.contract import SENSORS, Effect, Variant, measured, on_axes
 from trihedron.diagnose.session.solve import Distortion
 from trihedron.probability import CLEAR
 from trihedron.records.diagnosis import EffectParameter
@@ -48,8 +48,7 @@ class _Late(Effect):
         if variant.names[-1] != BOTH:
             return lags
         std, smoothing = sigmas_of(covariance), slice(1, len(value) - 1)
-        of_square = zip(variant.names[smoothing], value[smoothing], std[smoothing], strict=True)
-        return lags[0], *(EffectParameter(name, float(v), float(s), "1") for name, v, s in of_square)
+        return lags[0], *measured(variant.names[smoothing], value[smoothing], std[smoothing], "1" * (len(value) - 2))
 
 
 class SensorLag(_Late):

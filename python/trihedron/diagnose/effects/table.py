@@ -8,7 +8,7 @@ from scipy.special import chdtrc, ndtr, stdtrit
 from trihedron.arrays import FloatArray
 from trihedron.defaults import FALSE_ALARM
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import DirectEffect, Evidence
+from trihedron.diagnose.effects.contract import DirectEffect, Evidence, measured
 from trihedron.probability import CLEAR, SURE, bdtrc
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
@@ -119,10 +119,8 @@ class TurnAngleError(TableEffect):
             return None
         obs, wrong = context.obs, [turns[k].move for k in bad]
         names = obs.move_names(wrong)
-        parameters = tuple(
-            EffectParameter(f"error of {name}", float(np.degrees(errors[k])), float(np.degrees(sigmas[k])), "deg")
-            for k, name in zip(bad, names, strict=True)
-        )
+        off, spread = np.degrees(errors[bad]), np.degrees(sigmas[bad])
+        parameters = measured([f"error of {name}" for name in names], off, spread, ["deg"] * len(bad))
         return Evidence(
             p, chi2, parameters,
             self.reported(

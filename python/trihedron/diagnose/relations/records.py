@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.arrays import AXES, FloatArray, sigmas_of
-from trihedron.diagnose.effects.contract import SENSORS
+from trihedron.arrays import AXES, FloatArray
+from trihedron.diagnose.effects.contract import SENSORS, measured
 from trihedron.diagnose.hypothesis import held_out_records
 from trihedron.diagnose.relations.search import Follows, Related
 from trihedron.diagnose.relations.signals import WORLD_VECTOR
-from trihedron.diagnose.residuals.noise_level import noise_changes
+from trihedron.diagnose.residuals.within_poses import noise_changes
 from trihedron.diagnose.session.observations import Observations
 from trihedron.gravity import EARTH_RATE_RAD_S
 from trihedron.probability import CLEAR
@@ -63,27 +63,19 @@ def _relation(
 
 
 def _of_variables(one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
-    effect, variant, sigma = one.effect, one.term.variant, sigmas_of(covariance)
-    out = SENSORS[effect.sensor].unit
-    coefficients: list[EffectParameter] = []
-    names: list[str] = []
-    axes: list[str] = []
-    for name, size, error, unit in zip(variant.names, value, sigma, variant.units, strict=True):
-        axis, _, variable = name.rpartition(": ")
-        per = out if unit == "1" else f"({out})/({unit})"
-        coefficients.append(EffectParameter(name, float(size), float(error), per))
-        names.append(variable)
-        axes += [axis] if axis else AXES
-    names, axes = list(dict.fromkeys(names)), list(dict.fromkeys(axes))
-    for shape, (size, unit) in variant.shape.items():
-        coefficients.append(EffectParameter(shape, size, variant.shape_sigma, unit))
+    effect, variant, out = one.effect, one.term.variant, SENSORS[one.effect.sensor].unit
+    units = [out if unit == "1" else f"({out})/({unit})" for unit in variant.units]
+    coefficients = effect.parameters(replace(variant, units=tuple(units)), value, covariance)
+    parts = [name.rpartition(": ") for name in variant.names]
+    names = list(dict.fromkeys(variable for *_, variable in parts))
+    axes = list(dict.fromkeys(letter for axis, *_ in parts for letter in ([axis] if axis else AXES)))
     form = words("relation-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(names)])
     statement = words(
         "relation-follows", sensor=SENSORS[effect.sensor].label, is_static=not effect.is_motion, axes=axes,
         depends=tuple(names), share=share,
     )  # fmt: skip
     said = form, statement
-    return _relation(effect.sensor, tuple(names), tuple(coefficients), share, effect.family, said)
+    return _relation(effect.sensor, tuple(names), coefficients, share, effect.family, said)
 
 
 def _of_world_vector(_one: Follows, value: FloatArray, covariance: FloatArray, share: float) -> Relation:
@@ -95,14 +87,13 @@ def _of_world_vector(_one: Follows, value: FloatArray, covariance: FloatArray, s
     spread = float(np.std([angle for _, angle in drawn]))
     away = min(float((np.abs(coupling - s * EARTH_RATE_RAD_S * np.eye(3)) / sigma).max()) for s in (1.0, -1.0))
     family = "earth" if away < CLEAR else "world"
-    coefficients = [
-        EffectParameter(f"{AXES[i]}: m_{AXES[j]}", float(coupling[i, j]), float(sigma[i, j]), "rad/s")
-        for i, j in np.ndindex(3, 3)
-    ]
-    coefficients.append(EffectParameter(words("angle-to-vertical"), inclination, spread, "deg"))
+    coefficients = (
+        *measured([f"{i}: m_{j}" for i in AXES for j in AXES], coupling.ravel(), sigma.ravel(), ["rad/s"] * 9),
+        EffectParameter(words("angle-to-vertical"), inclination, spread, "deg"),
+    )
     statement = words("relation-follows-world", inclination_deg=inclination, inclination_sigma_deg=spread, share=share)
     said = words("relation-form-world"), statement
-    return _relation(1, (WORLD_VECTOR,), tuple(coefficients), share, family, said)
+    return _relation(1, (WORLD_VECTOR,), coefficients, share, family, said)
 
 
 def _coupling(parts: FloatArray, like: FloatArray | None = None) -> tuple[FloatArray, float]:

@@ -52,10 +52,9 @@ def locate(fitted: Fit, label: int) -> Where:
     system, obs = fitted.system, fitted.obs
     rows = np.flatnonzero((system.domain == label) & (system.walk == 0))
     squared = system.residual[rows] ** 2
-    segments = system.segment[rows]
-    per_segment = {int(s): float(squared[segments == s].sum()) for s in np.unique(segments)}
-    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > CLEAR**2][:5]
-    per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
+    per_segment = np.bincount(system.segment[rows], squared)
+    heavy = [s for s in np.argsort(-per_segment, kind="stable").tolist() if per_segment[s] > CLEAR**2][:5]
+    per_channel = np.bincount(system.channel[rows], squared, minlength=3)
     names = CHANNELS[3:] if label in (STATIC_GYRO, MOVES) else CHANNELS[:3]
     channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] >= per_channel.mean())
     if label in (STATIC_ACCEL, STATIC_GYRO):
