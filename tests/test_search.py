@@ -121,7 +121,7 @@ def test_a_relation_beside_the_place_and_the_motion_alone_is_unexplained(named, 
         found=found,
         gains=gains,
         shares=[0.8],
-        beside=set(),
+        seen={},
         biases=(),
     )
     assert Answer.says_why.fget(answer) is is_explained

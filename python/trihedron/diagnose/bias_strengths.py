@@ -95,18 +95,18 @@ def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
     """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains, that of
     a walk to what poses do not show."""
-    corner, scatter, excess = _bounded(model.obs, model.within, {(effect.sensor, effect.walks)})
-    least = FLICKER_WITHIN * NOISE_CORNER_S
-    accel, gyro = (max(c, least) if effect.walks and s == effect.sensor else c for s, c in enumerate(corner))
-    return (accel, gyro), scatter, excess
+    return _bounded(model.obs, model.within, {(effect.sensor, effect.walks)}, FLICKER_WITHIN * NOISE_CORNER_S)
 
 
-def _bounded(obs: Observations, within: Bounds, which: Collection[tuple[int, bool]]) -> Bounds:
-    """Bounds, those of some processes (sensor, whether it walks) replaced by what the part's own noise explains."""
+def _bounded(
+    obs: Observations, within: Bounds, which: Collection[tuple[int, bool]], least_s: float = NOISE_CORNER_S
+) -> Bounds:
+    """Bounds, those of some processes (sensor, whether it walks) replaced by what the part's own noise explains: of a
+    walk a corner time of ``least_s``."""
     corner, scatter, excess = within
     # 1/f noise inside the poses explains so much; scatter below the standard error of a pose mean shows in none.
     flicker = FLICKER_WITHIN * np.array([obs.force_scatter, obs.rate_scatter]) / obs.scatter_unit()[:, 0]
-    corners = [NOISE_CORNER_S if (s, True) in which else corner[s] for s in range(2)]
+    corners = [least_s if (s, True) in which else corner[s] for s in range(2)]
     scatters = [max(float(flicker[s]), 1.0) if (s, False) in which else scatter[s] for s in range(2)]
     return (corners[0], corners[1]), (scatters[0], scatters[1]), excess
 

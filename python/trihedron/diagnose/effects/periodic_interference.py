@@ -26,14 +26,12 @@ class PeriodicInterference(DirectEffect):
         others = [line for line in lines if line not in same]
         parameters = [EffectParameter("frequency", strongest.frequency_hz, strongest.frequency_sigma_hz, "Hz")]
         for line in (*same, *others):
+            of, (sensor, axis) = line.channel, divmod(line.index, 3)
             if line in others:
-                name = f"frequency_{line.channel}"
-                parameters.append(EffectParameter(name, line.frequency_hz, line.frequency_sigma_hz, "Hz"))
-            sensor, axis = divmod(line.index, 3)
+                parameters.append(EffectParameter(f"frequency_{of}", line.frequency_hz, line.frequency_sigma_hz, "Hz"))
             scale, unit = float(context.si_per_raw(sensor)[axis]), SENSORS[sensor].unit
-            parameters.append(
-                EffectParameter(f"amplitude_{line.channel}", line.amplitude * scale, line.amplitude_sigma * scale, unit)
-            )
+            size, std = line.amplitude * scale, line.amplitude_sigma * scale
+            parameters.append(EffectParameter(f"amplitude_{of}", size, std, unit))
         frequencies = (strongest.frequency_hz, *(line.frequency_hz for line in others))
         where = Where(tuple(line.channel for line in lines), (), (), frequencies)
         before, after, noise = strongest.rms_before, strongest.rms_after, strongest.noise

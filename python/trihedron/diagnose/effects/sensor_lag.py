@@ -47,8 +47,8 @@ class _Late(Effect):
         lags = super().parameters(variant, value, covariance)
         if variant.names[-1] != BOTH:
             return lags
-        std, smoothing = sigmas_of(covariance), slice(1, len(value) - 1)
-        return lags[0], *measured(variant.names[smoothing], value[smoothing], std[smoothing], "1" * (len(value) - 2))
+        own = slice(1, len(value) - 1)
+        return lags[0], *measured(variant.names[own], value[own], sigmas_of(covariance)[own], ["1"] * (len(value) - 2))
 
 
 class SensorLag(_Late):

@@ -13,10 +13,10 @@ import numpy as np
 
 from trihedron.arrays import AXES, FloatArray
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.bias_process import COSINES, N_STEPS
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.relations.dependence import Column, Dependence
 from trihedron.diagnose.relations.rotations import HISTORY, decaying, retained
-from trihedron.diagnose.relations.scales import scales_in_time
 
 WORLD_VECTOR = "vector fixed in the world frame"
 DIPS_DEG = ((45.0,), (72.0, 84.0))
@@ -42,6 +42,36 @@ class WorldVector(Dependence):
         dip = next(dip for dip in self.dips_deg if variant.label == f"dip of {dip:.0f}°")
         steep = np.where(np.arange(variant.distortion.n_parameters) % 3 == 2, np.tan(np.radians(dip)), 1.0)
         return np.asarray(super().sizes(context, variant) * steep)
+
+
+class ScaleInTime(Dependence):
+    """A scale that changes in time: the motion times functions of time, of one axis, of each axis its own, or of all
+    axes (a reference voltage); or a triad that turns in the case, which gravity does not show of an accelerometer."""
+
+    def __init__(self, sensor: int, *courses: Sequence[Column]) -> None:
+        parts = [(0,), (1,), (2,), (0, 1, 2), (3,), *([(4, 5, 6)] if sensor else [])]
+        super().__init__(sensor, "scale", *courses, is_motion=bool(sensor), parts=parts)
+
+    def base(self, context: Context) -> tuple[FloatArray, Sequence[str]]:
+        motion = context.axis_motion(self.sensor) / (1.0 if self.sensor else context.fitted.state.gravity)
+        symbol, own = "uw"[self.sensor], context.on_axes(self.sensor, motion)
+        turned = np.cross(np.eye(3)[None], motion[:, None, :]).transpose(0, 2, 1)
+        names = [*(f"{axis}: {symbol}_{axis}" for axis in AXES), symbol]
+        names += [f"{axis}: triad turned about {axis}" for axis in AXES]
+        return np.concatenate([own, own.sum(axis=2, keepdims=True), turned], axis=2), names
+
+
+def scales_in_time(context: Context, sensor: int) -> list[Dependence]:
+    """Line, slow curve, and steps between poses, evenly spread over them."""
+    x, times, h, unit = context.elapsed, context.time_s, context.obs.n_poses, ("g", "rad/s")[sensor]
+    middle = 0.5 * (times[: h - 1] + times[1:h])
+    places = middle[np.unique(np.linspace(0, h - 2, N_STEPS + 2)[1:-1].round().astype(int))]
+    line = [("over time", x, unit)]
+    curve = [(f"times cosine {k} of time", np.cos(np.pi * k * x), unit) for k in COSINES]
+    steps = [[(f"after {at:.0f} s", (times > at).astype(np.float64), unit)] for at in places]
+    # A constant part is the scale itself.
+    centred = [[(name, v - v.mean(), unit) for name, v, unit in course] for course in (line, curve, *steps)]
+    return [ScaleInTime(sensor, *some) for some in (centred[:1], centred[1:2], centred[2:])]
 
 
 def dependences(context: Context) -> list[Dependence]:

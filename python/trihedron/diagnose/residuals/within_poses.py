@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtrc
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import CHANNELS, N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import LOUD, Observations
 from trihedron.probability import CLEAR, LEAST_P, RARE_ALARM
@@ -59,7 +58,7 @@ def pose_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
     x = obs.readings
     out = []
     # Lines are searched in quiet poses: vibration has a spectrum of its own.
-    quiet: npt.NDArray[np.bool_] = np.asarray((pose_scatter(obs).ratio < 2.0).all(axis=1))
+    quiet: BoolArray = np.asarray((pose_scatter(obs).ratio < 2.0).all(axis=1))
     if quiet.sum() < 3:
         quiet[:] = True
     for i in np.flatnonzero(quiet):
@@ -85,31 +84,33 @@ def find_lines(obs: Observations, p_limit: float = RARE_ALARM) -> list[Line]:
 
 @dataclass(frozen=True, eq=False)
 class PoseScatter:
-    """Fast scatter of every pose: ``ratio`` of its variance to the common one (poses, channels), ``dof`` (poses,)."""
+    """Fast scatter of every pose: ``ratio`` of its variance to the common one (poses, channels), ``dof`` (poses,), and
+    whether it is ``steady`` (poses,): one already marked as vibrating is weighted by its own scatter, and is no
+    disagreement."""
 
     ratio: FloatArray
     dof: FloatArray
+    steady: BoolArray
     p_value: FloatArray
 
 
 @lru_cache(maxsize=4)
 def pose_scatter(obs: Observations) -> PoseScatter:
     """Variance of first differences per pose over the median of all: sensitive to vibration, not to slow drift."""
-    x = obs.readings
-    ratio, dof = [], []
-    for pose in obs.segments.poses:
-        part = x[pose.start : pose.stop]
-        steps = np.diff(part, axis=0)
+    x, found = obs.readings, []
+    for start, stop in obs.segments.spans:
+        steps = np.diff(x[start:stop], axis=0)
         own = np.var(steps, axis=0)
-        ratio.append(np.nanvar(steps, axis=0) if np.isnan(own).any() else own)
-        # Neighbouring differences share a sample: two thirds as many are independent.
-        dof.append((len(part) - 1) * 2.0 / 3.0)
-    variance, freedom = np.array(ratio), np.array(dof)
+        found.append(np.nanvar(steps, axis=0) if np.isnan(own).any() else own)
+    # Neighbouring differences share a sample: two thirds as many are independent.
+    variance, freedom = np.array(found), (np.diff(obs.segments.spans, axis=1)[:, 0] - 1) * 2.0 / 3.0
     # Readings that toggle between two neighbouring codes scatter by up to half an LSB squared without any vibration.
     centre = np.maximum(np.median(variance, axis=0), 0.5 * obs.recording.facts.steps[: x.shape[1]] ** 2)
     centre[centre == 0] = 1.0
     relative = variance / centre
-    return PoseScatter(relative, freedom, np.asarray(chdtrc(freedom[:, None], freedom[:, None] * relative)))
+    steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
+    p_value = np.asarray(chdtrc(freedom[:, None], freedom[:, None] * relative))
+    return PoseScatter(relative, freedom, steady, p_value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,13 +161,9 @@ def _change(obs: Observations, sensor: int) -> NoiseChange | None:
 
 
 def loud_poses(obs: Observations) -> FloatArray:
-    """(poses, channels) p-values of poses that are louder than usual, times the number of looks; 1 for the others.
-
-    A pose already marked as vibrating is weighted by its own scatter: it is no disagreement.
-    """
+    """(poses, channels) p-values of poses that are louder than usual, times the number of looks; 1 for the others."""
     scatter = pose_scatter(obs)
-    steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
-    is_loud = steady[:, None] & (scatter.ratio > LOUD)
+    is_loud = scatter.steady[:, None] & (scatter.ratio > LOUD)
     return np.where(is_loud, np.minimum(scatter.p_value * scatter.p_value.size, 1.0), 1.0)
 
 
@@ -180,13 +177,12 @@ def judge_within_poses(obs: Observations, alpha: float) -> DomainTest:
     tests."""
     scatter, loud = pose_scatter(obs), loud_poses(obs)
     p_scatter = float(loud.min(initial=1.0))
-    steady = np.array([not pose.is_unsteady for pose in obs.segments.poses])
     lines = [line for line in find_lines(obs) if line.has_size]
     p_line = min((line.p_value for line in lines), default=1.0)
     changes = {one: float(np.exp(-0.5 * one.score)) for one in noise_changes(obs)}
     p = min(1.0, len(TESTS) * min(p_scatter, p_line, *changes.values()))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])
-    weight = scatter.dof * steady if steady.any() else scatter.dof
+    weight = scatter.dof * scatter.steady if scatter.steady.any() else scatter.dof
     chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=weight).mean())
     disagrees = p < alpha / N_DOMAINS_TESTED
     where = Where()
