@@ -127,9 +127,13 @@ class BiasDrift(BiasProcess):
     ) -> tuple[tuple[EffectParameter, ...], Words]:
         """Parameters and sentence of a random walk, or of the step or curve of a ``variant``; readings of a log of one
         orientation may be counts of unknown scale."""
-        kind = "walk" if variant is None else STEP if variant.label == STEP else "static"
-        shape = {} if variant is None else {name: value for name, (value, _) in variant.shape.items()}
-        said = self.reported(kind, range=size, is_counts=is_counts, **shape)
+        if variant is None:
+            said = self.reported("walk", range=size, is_counts=is_counts)
+        elif variant.label == STEP:
+            at_s, _ = variant.shape[STEP_TIME]
+            said = self.reported("step", range=size, step_time=at_s, is_counts=is_counts)
+        else:
+            said = self.reported("static", range=size, is_counts=is_counts)
         return per_axis_parameters("range", size, std, self.unit), said
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
