@@ -54,13 +54,11 @@ def all_beside(model: Hypothesis, effects: Sequence[Effect]) -> tuple[list[Tried
 
 
 def candidates_beside(
-    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str], least: float = -STRONG_SCORE,
-    of_best: float = 0.0,
-) -> list[Tried]:  # fmt: skip
-    """Candidates to add to a hypothesis, best first, that score more than ``least``, and more than a share ``of_best``
-    of the best, at some strengths."""
+    model: Hypothesis, effects: Sequence[Effect], exclude: Collection[str], least: float = -STRONG_SCORE
+) -> list[Tried]:
+    """Candidates to add to a hypothesis, best first, that score more than ``least`` at some strengths."""
     offered = offered_beside(model, effects, exclude)
-    leading = _leaders(model, offered, price_of_choice(model, effects), least, of_best)
+    leading = _leaders(model, offered, price_of_choice(model, effects), least)
     if not leading:
         return []
     asked = model.with_added(leading)
@@ -121,7 +119,7 @@ def price_of_choice(model: Hypothesis, effects: Sequence[Effect]) -> float:
     return 2.0 * float(np.log(max(sum(one.unavailable(model.context) is None for one in effects), 1)))
 
 
-def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float, least: float, of_best: float) -> list[Term]:
+def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float, least: float) -> list[Term]:
     """Candidates that gain most one linear step from the fit, at its noise strengths and others, at their best size."""
     kept: list[tuple[Term, bool, FloatArray]] = []
     # A few at a time: the columns of all relations together need more memory than the log.
@@ -130,8 +128,6 @@ def _leaders(model: Hypothesis, offered: Sequence[Effect], price: float, least: 
         looks = zip(terms, model.gains(terms, PRIOR_SCALES), strict=True)
         may = [(term, *look) for term, look in looks if 2.0 * float(look[0].max()) - term.cost > least]
         kept = _ahead([*kept, *((term, _can_be(model, term, look), gain) for term, gain, look in may)])
-    best = max((2.0 * float(gain.max()) - term.cost for term, _, gain in kept), default=0.0)
-    kept = [one for one in kept if 2.0 * float(one[-1].max()) - one[0].cost >= of_best * best]
     scales = [PRIOR_SCALES[int(gain.max(axis=1).argmax())] for *_, gain in kept]
     return [term.scaled(scale) for (term, *_), scale in zip(kept, scales, strict=True)]
 

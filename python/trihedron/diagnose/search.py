@@ -13,7 +13,6 @@ import numpy as np
 
 from trihedron.diagnose.bias_strengths import bias_strengths, bounds_without, explain_as_much
 from trihedron.diagnose.candidates import (
-    OF_THE_BEST,
     Tried,
     all_beside,
     candidates_beside,
@@ -97,8 +96,7 @@ class _Search:
 
     def _with_one_more(self, model: Hypothesis) -> Hypothesis | None:
         """The hypothesis with the best effect that lowers a held-out rms, or none."""
-        # Noise strengths found anew rarely double what an effect gains.
-        tried = candidates_beside(model, self.effects, self.dropped, of_best=OF_THE_BEST**2)
+        tried = candidates_beside(model, self.effects, self.dropped)
         standing = [one for one in tried if one.score > self.limit]
         while standing:
             larger, chosen = with_best(model, standing)

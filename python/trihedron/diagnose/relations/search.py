@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from trihedron.diagnose.candidates import OF_THE_BEST, candidates_beside, with_best
+from trihedron.diagnose.candidates import candidates_beside, with_best
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.dependence import Dependence
@@ -68,7 +68,7 @@ def _leading(model: Hypothesis, known: set[str], limit: float, least: float) -> 
     """The relation of most evidence, if it predicts what is held out; random telegraph signals by their own score."""
     every: dict[str, Dependence] = {one.id: one for one in dependences(model.context)}
     out = []
-    tried = candidates_beside(model, list[Effect](every.values()), known, least, OF_THE_BEST**2)
+    tried = candidates_beside(model, list[Effect](every.values()), known, least)
     standing = [one for one in tried if one.score > limit]
     larger, term = with_best(model, standing) if standing else (model, None)
     if term is not None and larger.is_shown(model, len(model.terms)):
