@@ -186,10 +186,12 @@ def check_units(calibration: Calibration, recording: Recording) -> None:
 
     Raises ``InputError`` when they are not; the message names both units.
     """
-    known = dict(calibration.sensors)
-    for name, _, unit in recording.sensors:
-        sensor = known.get(name)
-        if sensor is not None and unit != sensor.raw_unit:
+    pairs = (
+        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value, calibration.accelerometer),
+        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value, calibration.gyroscope),
+    )
+    for name, readings, unit, sensor in pairs:
+        if readings is not None and sensor is not None and unit != sensor.raw_unit:
             raise InputError(
                 f"{recording.source}: its {name} is in {unit}, and this calibration maps {sensor.raw_unit}: "
                 f"apply it to a log in {sensor.raw_unit}, or state the log's unit if it was detected wrongly."

@@ -57,8 +57,12 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
 def _columns(recording: Recording) -> dict[str, FloatArray]:
     # Rounded to nanoseconds: finer digits are the rounding of 1/rate and lengthen the text.
     columns: dict[str, FloatArray] = {_TIME: np.round(recording.start_epoch_s + recording.time_s, 9)}
-    for name, readings, unit in recording.sensors:
-        columns |= {f"{name[0]}{axis} [{unit}]": readings[:, k] for k, axis in enumerate(AXES)}
+    for letter, sensor, unit in (
+        ("a", recording.accelerometer, recording.accelerometer_unit),
+        ("g", recording.gyroscope, recording.gyroscope_unit),
+    ):
+        if sensor is not None:
+            columns |= {f"{letter}{axis} [{unit.value}]": sensor[:, k] for k, axis in enumerate(AXES)}
     columns |= recording.auxiliary
     if recording.temperature_degc is not None:
         columns["temperature [degC]"] = recording.temperature_degc

@@ -238,17 +238,10 @@ class Recording(Checked, Presented):
         found: dict[str, tuple[LowPass, ...]] = ask("find_low_passes", self._readings(), self.rate_hz)
         return found
 
-    @property
-    def sensors(self) -> list[tuple[str, FloatArray, str]]:
-        """Name, readings (n, 3) and raw unit of the sensors that were logged."""
-        both = (
-            ("accelerometer", self.accelerometer, self.accelerometer_unit.value),
-            ("gyroscope", self.gyroscope, self.gyroscope_unit.value),
-        )
-        return [(name, readings, unit) for name, readings, unit in both if readings is not None]
-
     def _readings(self) -> dict[str, FloatArray]:
-        return {name: readings for name, readings, _ in self.sensors}
+        """Readings (n, 3) of the sensors present, by name."""
+        named = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
+        return {name: one for name, one in named.items() if one is not None}
 
     @property
     def n_samples(self) -> int:
@@ -275,7 +268,14 @@ class Recording(Checked, Presented):
         return float(self.time_s[-1] - self.time_s[0]) + 1.0 / self.rate_hz
 
     def __repr__(self) -> str:
-        sensors = " + ".join(f"{name} [{unit}]" for name, _, unit in self.sensors)
+        sensors = " + ".join(
+            f"{name} [{unit.value}]"
+            for name, value, unit in (
+                ("accelerometer", self.accelerometer, self.accelerometer_unit),
+                ("gyroscope", self.gyroscope, self.gyroscope_unit),
+            )
+            if value is not None
+        )
         size = f"{self.n_samples} samples, {self.duration_s:.1f} s at {self.rate_hz:.4g} Hz"
         return f"<Recording {one_line(self.source)}: {size}, {sensors}>"
 

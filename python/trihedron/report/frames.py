@@ -14,6 +14,7 @@ from trihedron.records import PARAMETER_NAMES, Calibration, Noise, Recording, Se
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.sessions import SessionsModel
 from trihedron.report.noise_units import PER_UNIT
+from trihedron.report.segments import logged_sensors
 
 Columns = dict[str, Sequence[Any] | npt.NDArray[Any]]
 
@@ -45,7 +46,7 @@ def of_rows(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Columns:
 def recording_columns(recording: Recording) -> Columns:
     """A row per sample, units in the names."""
     columns: Columns = {"time_s": recording.time_s}
-    for name, readings, unit in recording.sensors:
+    for name, readings, unit in logged_sensors(recording):
         columns |= {f"{name}_{axis} [{unit}]": readings[:, k] for k, axis in enumerate(AXES)}
     for name in ("temperature_degc", "supply_v"):
         if (values := getattr(recording, name)) is not None:

@@ -153,7 +153,7 @@ def truth_chart(recording: Recording, truth: Truth) -> Chart:
 def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
     panels = []
     limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
-    for name, readings, unit in recording.sensors:
+    for name, readings, unit in logged_sensors(recording):
         lines = [
             Line(*envelope(recording.time_s, readings[:, k]), XYZ[k], AXIS_COLOURS[k], is_thin=True) for k in range(3)
         ]
@@ -190,7 +190,7 @@ CHANNELS = "The channels; bandwidth in the quietest intervals of the whole log"
 def channels_table(recording: Recording) -> Table:
     """A row per axis, or one per sensor where its axes are equal."""
     rows: list[tuple[str, ...]] = []
-    for name, _, raw_unit in recording.sensors:
+    for name, _, raw_unit in logged_sensors(recording):
         unit = unit_in_print(raw_unit)
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)
         cells = [
@@ -211,7 +211,7 @@ def channels_table(recording: Recording) -> Table:
 def channels_record(recording: Recording) -> dict[str, Any]:
     """For JSON: ``resolution`` (3,), ``range_limits`` and ``low_pass`` of every axis, raw units and Hz."""
     out: dict[str, Any] = {}
-    for name, *_ in recording.sensors:
+    for name, *_ in logged_sensors(recording):
         facts, filters = recording.facts.of(name), recording.low_passes.get(name)
         out[name] = {
             "resolution": facts.step,
@@ -219,6 +219,15 @@ def channels_record(recording: Recording) -> dict[str, Any]:
             "low_pass": None if filters is None else [_filter_record(one) for one in filters],
         }
     return out
+
+
+def logged_sensors(recording: Recording) -> list[tuple[str, FloatArray, str]]:
+    """Name, readings (n, 3) and raw unit of the sensors that the log contains."""
+    both = (
+        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value),
+        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),
+    )
+    return [(name, readings, unit) for name, readings, unit in both if readings is not None]
 
 
 def _ends(limits: list[Limit], unit: str) -> str:

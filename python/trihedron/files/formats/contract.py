@@ -79,12 +79,6 @@ class ExportOptions:
     gyro_lsb: str = ""
     current_parameters: str = ""
 
-    @property
-    def noises(self) -> list[tuple[str, SensorNoise]]:
-        """The noise that is given, by sensor."""
-        both = (("accelerometer", self.accelerometer_noise), ("gyroscope", self.gyroscope_noise))
-        return [(name, noise) for name, noise in both if noise is not None]
-
 
 @dataclass(frozen=True)
 class Format:

@@ -143,16 +143,16 @@ def lost_in_simulation(
         if not holds_bias and has_bias(sensor):
             lines.append(f"The bias of the {name} cannot be held: {size_of_bias(name, b)} is lost.")
     lines += more(known, options)
-    for name, noise in options.noises:
-        if noise.K.is_limit:
+    for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise)):
+        if noise is not None and noise.K.is_limit:
             lines.append(f"The {name}'s walk is an upper limit: it was not seen in the static log.")
     return lines
 
 
 def _lost_in_isaac(known: Calibration, options: ExportOptions) -> list[str]:
     lines = lost_to_a_diagonal(known)
-    for name, noise in options.noises:
-        if noise.K.value > 0.0 and not noise.K.is_limit:
+    for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise)):
+        if noise is not None and noise.K.value > 0.0 and not noise.K.is_limit:
             size = size_of_bias(name, noise.K.value * math.sqrt(60.0), 2)
             lines.append(f"The walk of the {name}'s bias cannot be held: {size} in a minute is lost.")
     return lines

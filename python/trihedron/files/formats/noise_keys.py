@@ -60,7 +60,8 @@ def limits(options: ExportOptions) -> list[str]:
     """A sentence for each figure that is an upper limit."""
     return [
         f"{name} {term} is an upper limit from the static log."
-        for name, noise in options.noises
+        for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise))
+        if noise is not None
         for term, figure in (("N", noise.N), ("K", noise.K))
         if figure.is_limit
     ]
