@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import fft, special
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import convolve1d, uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from trihedron import _core, probability
@@ -339,8 +340,6 @@ def test_anything_else_is_no_plain_table(text):
 
 
 def test_the_roughness_of_a_motion_is_what_a_running_least_squares_parabola_leaves():
-    from scipy.ndimage import convolve1d, uniform_filter1d
-
     width, motion = 25, np.random.default_rng(5).normal(size=(200, 3))
     middle = np.linalg.pinv(np.vander(np.arange(width) - width // 2, 3))[2]
     away = motion - convolve1d(motion, middle, axis=0, mode="nearest")
