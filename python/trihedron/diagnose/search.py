@@ -184,6 +184,6 @@ class _Search:
             kept = [*best.model.terms[:k], *best.model.terms[k + 1 :]]
             beside = again(best.model, kept) if best.relations else fewer
             score = best.model.gain_over(beside) - term.cost
-            if score < self.limit or related(fewer, self.limit, best.relations, needed).score > needed:
+            if score < self.limit or related(fewer, self.limit, best.relations).score > needed:
                 return self._beside_relations(self._pruned(fewer))
         return model, best

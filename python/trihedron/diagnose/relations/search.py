@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +11,6 @@ from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 from trihedron.diagnose.relations.dependence import Dependence
 from trihedron.diagnose.relations.signals import dependences
 from trihedron.diagnose.relations.telegraph import TELEGRAPH, telegraphs
-from trihedron.probability import STRONG_SCORE
 
 MOST_RELATIONS = 3
 """A longer list is no relation that a person would check."""
@@ -38,37 +36,29 @@ class Related:
     score: float
 
 
-def related(
-    model: Hypothesis, limit: float, begin: Sequence[Follows] | None = None, needed: float = -math.inf
-) -> Related:
+def related(model: Hypothesis, limit: float, begin: Sequence[Follows] | None = None) -> Related:
     """Relations added to a hypothesis one at a time while the best scores more than ``limit``; beside those of another
-    hypothesis, ``begin``, one more, if with it the whole may score ``needed``."""
+    hypothesis, ``begin``, one more."""
     found, terms = [one for one in begin or () if one.effect.family != TELEGRAPH], model.terms
     known, most = {one.effect.id for one in found}, MOST_RELATIONS if begin is None else len(found) + 1
     if found:
         model = again(model, [*terms, *(one.term for one in found)])
     while len(found) < most and model.context.moves:
-        # As far below what is needed as any candidate below the limit that is refitted.
-        least = max(needed - _score(model) - limit, 0.0) - STRONG_SCORE
-        best = max(_leading(model, known, limit, least), key=lambda one: one.score, default=None)
+        best = max(_leading(model, known, limit), key=lambda one: one.score, default=None)
         if best is None or best.score <= limit:
             break
         # The same variable under another prior takes the place of what it was.
         found = [*(one for one in found if one.effect.names != best.effect.names), best]
         known.add(best.effect.id)
         model = again(model, [*terms, *(one.term for one in found)])
-    return Related(model, tuple(found), _score(model))
+    return Related(model, tuple(found), 2.0 * model.log_evidence - sum(term.cost for term in model.terms))
 
 
-def _score(model: Hypothesis) -> float:
-    return 2.0 * model.log_evidence - sum(term.cost for term in model.terms)
-
-
-def _leading(model: Hypothesis, known: set[str], limit: float, least: float) -> list[Follows]:
+def _leading(model: Hypothesis, known: set[str], limit: float) -> list[Follows]:
     """The relation of most evidence, if it predicts what is held out; random telegraph signals by their own score."""
     every: dict[str, Dependence] = {one.id: one for one in dependences(model.context)}
     out = []
-    tried = candidates_beside(model, list[Effect](every.values()), known, least)
+    tried = candidates_beside(model, list[Effect](every.values()), known)
     standing = [one for one in tried if one.score > limit]
     larger, term = with_best(model, standing) if standing else (model, None)
     if term is not None and larger.is_shown(model, len(model.terms)):
