@@ -58,8 +58,8 @@ fn smoothed(values: &[f64], time: &[f64], width: f64) -> Vec<f64> {
     time.iter().map(between).collect()
 }
 
-/// Error of a mean over `width` samples, of noise and of rounding: by third differences of such means, in which a smooth
-/// course cancels; infinite where there are none.
+/// Error of a mean over `width` samples, of noise and of rounding: by third differences of such means, in which a
+/// smooth course cancels; infinite where there are none.
 fn error_of_mean(values: &[f64], width: f64) -> f64 {
     let length = whole(width);
     let means = means(&values[..values.len() / length * length], length);

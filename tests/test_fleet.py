@@ -10,6 +10,7 @@ import pytest
 
 import trihedron
 from hand_made_sessions import G, Instrument, recorded
+from trihedron.api import calibrating
 from trihedron.fleet import find_jobs, running, summarise
 from trihedron.fleet.summary import _spread_of_axes
 from trihedron.fleet.work import work
@@ -92,8 +93,6 @@ def test_other_bytes_options_or_devices_make_another_key_and_devices_are_named_b
 def test_a_defect_of_the_program_is_a_row_and_is_tried_again(logs, tmp_path, monkeypatch):
     def defect(*_args, **_options):
         raise ZeroDivisionError("by nothing")
-
-    from trihedron.api import calibrating
 
     path = logs / "unit_0" / "log_0.csv"
     # Whole, with its diagnosis; whoever imports `calibrate` has then done so.

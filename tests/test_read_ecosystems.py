@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 import trihedron
 from test_read import readings
@@ -252,7 +253,6 @@ def test_hdf5_groups_are_told_apart(tmp_path):
 def write_matlab(folder, table):
     """Columns of a table, by name, as files of both generations, ``old.mat`` and ``new.mat``."""
     import h5py
-    from scipy.io import savemat
 
     columns = {"t": table[:, 0], "acc": table[:, 1:4], "gyro": table[:, 4:], "fs": 100.0}
     savemat(folder / "old.mat", columns)
@@ -267,8 +267,6 @@ def write_matlab(folder, table):
 
 def test_matlab_files_of_both_generations_are_read(tmp_path):
     pytest.importorskip("h5py", reason="h5py (trihedron[hdf5]) is not installed")
-    from scipy.io import savemat
-
     columns = write_matlab(tmp_path, TABLE)
     assert_same(read_recording(tmp_path / "old.mat"))
     savemat(tmp_path / "struct.mat", {"imu": columns, "note": "x"})

@@ -22,8 +22,8 @@ type Seen<'py> = (
 
 /// Samples missing in moves `(m, 2)`: the samples behind which they are missing, clearest first, their numbers, gains in
 /// log-likelihood over none missing, and over unrelated sides as well; and the number of joints at which as many
-/// missing samples as the median loss has would be seen. `readings` has an array `(n, 3)` a sensor, in units of its noise,
-/// at `time_s` `(n,)`, usually `step_s` apart: no joint is asked at a gap, or near samples that are `is_cut` `(n,)`.
+/// missing samples as the median loss has would be seen. `readings` has an array `(n, 3)` a sensor, in units of its
+/// noise, at `time_s` `(n,)`, usually `step_s` apart: no joint is asked at a gap, or near samples `is_cut` `(n,)`.
 #[pyfunction]
 fn motion_joints<'py>(
     py: Python<'py>,
@@ -42,7 +42,10 @@ fn motion_joints<'py>(
     let n = time_s.len();
     let mut is_broken = is_cut.map_or_else(|| vec![false; n], |cut| flat1(&cut).into_owned());
     for k in aliasing::behind_gaps(&flat1(&time_s), step_s) {
-        is_broken[k] = true;
+        // A length that differs is refused below.
+        if let Some(at) = is_broken.get_mut(k) {
+            *at = true;
+        }
     }
     let moves = ranges_within(&moves, n)?;
     let sensors: Vec<Readings<'_>> = flat.iter().map(|one| as_rows(one)).collect();

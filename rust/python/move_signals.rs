@@ -40,7 +40,7 @@ fn play<'py>(
     out.to_pyarray(py).reshape([path.shape()[0], 3])
 }
 
-/// Rate of change per second `(n,)` of a channel `(n,)` at its times, `rate_hz` of them in a second; finite values only.
+/// Rate of change per second `(n,)` of a channel `(n,)` of finite values at its times, `rate_hz` of them in a second.
 #[pyfunction]
 fn channel_slope<'py>(
     py: Python<'py>,

@@ -23,6 +23,7 @@ mod move_losses;
 pub mod move_rows;
 pub mod moves;
 mod open_move;
+pub mod path;
 mod possible;
 mod possible_rate;
 pub mod predict;

@@ -163,10 +163,8 @@ def _fitted(
     correlation, scale = min(float(seen_alike[best]), 1.0), float(shared[best] / max(power[best], TINY))
     if not correlation > 0.0:
         return None
-    axes, sigma = (
-        tried[best].reshape(3, 3),
-        scale * math.sqrt((1.0 - correlation**2) / max(len(a) - 1, 1)) / correlation,
-    )
+    axes = tried[best].reshape(3, 3)
+    sigma = scale * math.sqrt((1.0 - correlation**2) / max(len(a) - 1, 1)) / correlation
     predicted = step_s * np.cross(a, w @ axes.T)
     left = seen - scale * predicted
     power, along = (np.add.reduceat(np.sum(predicted * other, axis=1), starts) for other in (predicted, seen))

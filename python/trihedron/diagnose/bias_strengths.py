@@ -23,11 +23,12 @@ from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds
 from trihedron.threads import side_by_side
 
 FLICKER_WITHIN = 2.0
-"""Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small; corner time, in
-that of the noisiest parts, of a walk that twenty poses in some minutes do not show: half an error of a pose, where a
-smooth drift of 12 errors is likely as a walk with theirs; and rms of a drifting bias over the poses, in standard errors
-of a pose mean, above which the drift is named: 1/f noise drifts too, up to 1.63 with 0.3 mg
-(benches/blind_nuisances.py --stress flicker)."""
+"""Factor by which the pose-to-pose scatter predicted from 1/f noise inside the poses may be too small; and rms of a
+drifting bias over the poses, in standard errors of a pose mean, above which the drift is named: 1/f noise drifts too,
+up to 1.63 with 0.3 mg (benches/blind_nuisances.py --stress flicker)."""
+DRIFT_CORNER_S = 2.0 * NOISE_CORNER_S
+"""Corner time of a walk that twenty poses in some minutes do not show: half an error of a pose. A smooth drift of 12
+errors is likely as a walk with the corner time of the noisiest parts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,7 @@ def noise_bounds(obs: Observations, but: Collection[BiasProcess] = ()) -> Bounds
 def bounds_without(model: Hypothesis, effect: BiasProcess) -> Bounds:
     """Bounds of the hypothesis, with the strength of ``effect`` bounded to what the part's own noise explains, that of
     a walk to what poses do not show."""
-    return _bounded(model.obs, model.within, {(effect.sensor, effect.walks)}, FLICKER_WITHIN * NOISE_CORNER_S)
+    return _bounded(model.obs, model.within, {(effect.sensor, effect.walks)}, DRIFT_CORNER_S)
 
 
 def _bounded(

@@ -11,11 +11,11 @@ use rayon::prelude::*;
 
 use super::evidence::{Answer, Candidate, Glance, seen, tuned};
 use super::read_out::{
-    Blocks, Path, Rows, Shares, attitude, flagged, labels, moves, path, shares_of, stacked,
+    Blocks, Path, Rows, Shares, flagged, labels, moves, path, shares_of, stacked,
 };
 use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
-use crate::python::arrays::{matrix, of3, vector3, vectors};
+use crate::python::arrays::{matrix, of3, stack3, vector3, vectors};
 use crate::python::{run, run_long};
 use crate::session_model::fit::Fit;
 use crate::session_model::move_rows::Weights;
@@ -140,15 +140,15 @@ impl SessionFit {
         labels(py, &self.fit)
     }
 
-    /// `(points, 3)` corrected rate and force, minus gravity propagated by the gyro from each move's start; `(points, 3,
-    /// 3)` rotation since the move began.
+    /// `(points, 3)` corrected rate and force, minus gravity propagated by the gyro from the start of each move;
+    /// `(points, 3, 3)` rotation since the move began.
     fn path<'py>(&self, py: Python<'py>) -> PyResult<Path<'py>> {
         path(py, &self.session, &self.fit)
     }
 
     /// `(points, 3, 3)` local level (z up, any azimuth) → body; NaN but for the vertical where no chain of moves leads.
     fn attitude<'py>(&self, py: Python<'py>) -> PyResult<Blocks<'py>> {
-        attitude(py, &self.session, &self.fit)
+        stack3(py, self.session.attitude(&self.fit).into_iter())
     }
 
     /// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise.

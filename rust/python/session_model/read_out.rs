@@ -1,6 +1,6 @@
 //! Rows and motion of a fitted session as arrays.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::DMatrix;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
     ToPyArray,
@@ -42,62 +42,17 @@ pub(super) fn labels<'py>(py: Python<'py>, fit: &Fit) -> PyResult<Bound<'py, PyA
     flat.to_pyarray(py).reshape([n, 4])
 }
 
-/// Rate, force, minus gravity propagated by the gyro from each move's start `(points, 3)`; rotation since the move began
-/// `(points, 3, 3)`.
+/// Rate, force, minus gravity propagated by the gyro `(points, 3)`; rotation since the move began `(points, 3, 3)`.
 pub(super) type Path<'py> = (Rows<'py>, Rows<'py>, Rows<'py>, Blocks<'py>);
 
-/// The motion at the poses, then at the samples of every move: corrected readings in the body.
 pub(super) fn path<'py>(py: Python<'py>, session: &Session, fit: &Fit) -> PyResult<Path<'py>> {
-    let h = session.n_poses();
-    let mut rate = vec![Vector3::zeros(); h];
-    let mut force: Vec<Vector3<f64>> = fit.state.up.iter().map(|up| up * session.gravity).collect();
-    let mut gravity = force.clone();
-    let mut turned = vec![Matrix3::identity(); h];
-    for (one, of) in fit.passed.iter().zip(session.moves.iter()) {
-        rate.extend_from_slice(&one.carried.rate);
-        force.extend_from_slice(&one.carried.force);
-        gravity.extend(
-            one.carried
-                .attitude
-                .iter()
-                .map(|turn| turn * force[of.before]),
-        );
-        turned.extend_from_slice(&one.carried.attitude);
-    }
+    let one = session.path(fit);
     Ok((
-        vectors(py, &rate)?,
-        vectors(py, &force)?,
-        vectors(py, &gravity)?,
-        stack3(py, turned.into_iter())?,
+        vectors(py, &one.rate)?,
+        vectors(py, &one.force)?,
+        vectors(py, &one.gravity)?,
+        stack3(py, one.turned.into_iter())?,
     ))
-}
-
-/// `(points, 3, 3)` local level (z up, any azimuth) → body, rotated by the gyro in moves, levelled in poses.
-///
-/// Poses that no chain of moves reaches have NaN but for the vertical, which gravity shows.
-pub(super) fn attitude<'py>(
-    py: Python<'py>,
-    session: &Session,
-    fit: &Fit,
-) -> PyResult<Blocks<'py>> {
-    let up = &fit.state.up;
-    let levelled = |near: Vector3<f64>, up: &Vector3<f64>| {
-        let x = (near - up * up.dot(&near)).normalize();
-        Matrix3::from_columns(&[x, up.cross(&x), *up])
-    };
-    let nowhere = Vector3::repeat(f64::NAN);
-    let unknown = |up: &Vector3<f64>| Matrix3::from_columns(&[nowhere, nowhere, *up]);
-    let mut out: Vec<Matrix3<f64>> = up.iter().map(unknown).collect();
-    out[0] = levelled(Vector3::ith(up[0].iamin(), 1.0), &up[0]);
-    for (one, of) in fit.passed.iter().zip(session.moves.iter()) {
-        let begin = out[of.before];
-        out.extend(one.carried.attitude.iter().map(|turn| turn * begin));
-        let x: Vector3<f64> = out[out.len() - 1].column(0).into();
-        if begin[(0, 0)].is_finite() {
-            out[of.before + 1] = levelled(x, &up[of.before + 1]);
-        }
-    }
-    stack3(py, out.into_iter())
 }
 
 /// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise covariance.
