@@ -5,7 +5,6 @@
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-use super::moves::N_MOVE;
 use crate::simd::{Instructions, fma, for_each_instruction_set};
 
 const LANES: usize = 4;
@@ -44,20 +43,6 @@ pub(super) fn add_product(out: &mut DMatrix<f64>, factor: f64, a: &DMatrix<f64>,
         width,
         b.as_slice(),
         height,
-    );
-}
-
-/// `out += aᵀ b` of the five rows of a move: `a` row after row, `b` column after column.
-pub(super) fn add_rows(out: &mut DMatrix<f64>, a: &[f64], b: &[f64]) {
-    let width = out.nrows();
-    add_products(
-        Instructions::detect(),
-        out.as_mut_slice(),
-        1.0,
-        a,
-        width,
-        b,
-        N_MOVE,
     );
 }
 

@@ -1,16 +1,14 @@
 //! The evidence of a hypothesis: the rows of a session at one state, with the columns of further effects, at any noise
 //! strengths (docs/model-session.md, 11.18).
 
-use std::borrow::Cow;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::Strengths;
 use super::chain::{Chain, Layout};
 use super::elimination::eliminated;
-use super::fit::{Fit, RIDGE, chi2_of, gradient};
+use super::equations::{Equations, OfPoses};
+use super::fit::{Fit, RIDGE};
 use super::move_rows::{MoveResidual, Whitening};
-use super::moves::N_MOVE;
 use super::open_move::Open;
 use super::rows::{Group, N_PROCESSES, size_row};
 use super::strength_search::{Search, Within};
@@ -20,27 +18,22 @@ use crate::error::{Error, Result};
 const RENEWALS: usize = 4;
 const SAME_WEIGHT: f64 = 0.2;
 
-/// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
-pub(super) struct Part {
-    pub chain: Chain,
-    pub side: DMatrix<f64>,
-    pub sum: f64,
-    pub n: usize,
-}
-
 /// All rows but those of the bias processes, and the logarithm of their normalisation.
 pub(super) struct Weighed {
-    pub part: Part,
+    pub equations: Equations,
     pub log_weight: f64,
 }
+
+/// A move to be weighed: its whitening, the residual in place of its own, the logarithm of its normalisation.
+pub(super) type Weighing = (Whitening, Option<MoveResidual>, f64);
 
 /// A session at one state, its rows by process; those of moves are not whitened yet.
 pub struct Hypothesis {
     layout: Layout,
     at: Strengths,
-    fixed: Part,
+    fixed: Equations,
     fixed_weight: f64,
-    pub(super) process: Vec<Part>,
+    pub(super) process: Vec<OfPoses>,
     pub(super) moves: Vec<Open>,
     n_added: usize,
 }
@@ -100,22 +93,15 @@ impl Hypothesis {
         }
         let weighed = fixed.iter().chain(process.iter().flatten());
         let fixed_weight = weighed.map(|group| group.log_weight).sum();
-        let part = |groups: &[Group], is_bordered: bool| Part {
-            chain: if is_bordered {
-                Chain::of(layout, groups.iter().map(|group| &group.rows))
-            } else {
-                Chain::of_poses(layout, groups.iter().map(|group| &group.rows))
-            },
-            side: gradient(layout, groups),
-            sum: chi2_of(groups),
-            n: groups.iter().map(|group| group.rows.len()).sum(),
-        };
         Ok(Self {
             layout,
             at: fit.strengths,
-            fixed: part(&fixed, true),
+            fixed: Equations::of(layout, &fixed),
             fixed_weight,
-            process: process.iter().map(|groups| part(groups, false)).collect(),
+            process: process
+                .iter()
+                .map(|groups| OfPoses::of(layout, groups))
+                .collect(),
             moves,
             n_added: k,
         })
@@ -126,33 +112,26 @@ impl Hypothesis {
         self.with_moves(self.moves.iter().map(|open| {
             let (white, _, prior) = open.whitening(strengths)?;
             let log_weight = white.diagonal().map(f64::ln).sum() + prior;
-            Some((Cow::Borrowed(&open.columns), white, log_weight))
+            Some((white, None, log_weight))
         }))
     }
 
-    /// The same with other rows of the moves: columns, whitening and the logarithm of the normalisation of each.
-    pub(super) fn with_moves<'a>(
+    /// The same with moves weighed otherwise.
+    pub(super) fn with_moves(
         &self,
-        moves: impl Iterator<Item = Option<(Cow<'a, DMatrix<f64>>, Whitening, f64)>>,
+        moves: impl Iterator<Item = Option<Weighing>>,
     ) -> Option<Weighed> {
         let mut log_weight = self.fixed_weight;
-        let mut chain = self.fixed.chain.clone();
-        let mut side = self.fixed.side.clone();
-        let mut sum = self.fixed.sum;
+        let mut equations = self.fixed.clone();
         for (open, one) in self.moves.iter().zip(moves) {
-            let (columns, white, own) = one?;
+            let (white, residual, own) = one?;
             log_weight += own;
-            sum += chain.add_move(open.pose, &columns, &white, &mut side);
+            equations.add_move(open, &white, residual.as_ref());
         }
-        chain.mirror();
-        let n = N_MOVE * self.moves.len() + self.fixed.n;
-        let part = Part {
-            chain,
-            side,
-            sum,
-            n,
-        };
-        Some(Weighed { part, log_weight })
+        Some(Weighed {
+            equations,
+            log_weight,
+        })
     }
 
     /// `L⁻¹` of every move's covariance at some strengths, by index of the move.
@@ -183,23 +162,18 @@ impl Hypothesis {
 
     /// Log-evidence at some strengths; `weighted_rows` are the rows outside the processes at them.
     pub(super) fn beside(&self, strengths: &Strengths, weighted_rows: &Weighed) -> f64 {
-        let (part, mut weight) = (&weighted_rows.part, weighted_rows.log_weight);
-        let mut side = part.side.clone();
-        let mut sum = part.sum;
-        let mut weighed = Vec::with_capacity(N_PROCESSES);
+        let mut weight = weighted_rows.log_weight;
+        let mut processes = Vec::with_capacity(N_PROCESSES);
         for (process, factor) in self.process.iter().zip(self.factors(strengths)) {
             if process.n == 0 {
                 continue;
             }
-            let squared = factor * factor;
-            weighed.push((&process.chain, squared));
-            side += &process.side * squared;
-            sum += process.sum * squared;
+            processes.push((process, factor * factor));
             weight += process.n as f64 * factor.ln();
         }
-        eliminated(&part.chain, &weighed, &side)
-            .map_or(f64::NEG_INFINITY, |(log_det, explained)| {
-                -0.5 * (sum - explained) - 0.5 * log_det + weight
+        eliminated(&weighted_rows.equations, &processes)
+            .map_or(f64::NEG_INFINITY, |(log_det, left)| {
+                -0.5 * left - 0.5 * log_det + weight
             })
     }
 
@@ -215,19 +189,22 @@ impl Hypothesis {
     }
 
     /// The most likely strengths, searched from the best of `starts`, and their gain in log-evidence over that one.
+    /// Unless `is_first` only the weights of moves changed since a search.
     ///
     /// # Errors
     /// When there are no `starts`.
-    pub fn likeliest(&self, starts: &[Strengths], within: &Within) -> Result<(Strengths, f64)> {
-        let values = self.at_each(starts);
-        let best = starts
-            .iter()
-            .zip(values)
-            .max_by(|a, b| a.1.total_cmp(&b.1))
+    pub fn likeliest(
+        &self,
+        starts: &[Strengths],
+        within: &Within,
+        is_first: bool,
+    ) -> Result<(Strengths, f64)> {
+        let each = starts.iter().map(|start| Search::new(self, start, within));
+        let mut search = each
+            .max_by(|a, b| a.value().total_cmp(&b.value()))
             .ok_or_else(|| Error::bad_input("strengths to begin from are missing"))?;
-        let mut search = Search::new(self, best.0, within);
         let before = search.value();
-        search.run();
+        search.run(is_first);
         Ok((search.strengths(), search.value() - before))
     }
 
@@ -239,21 +216,20 @@ impl Hypothesis {
         let rows = self
             .weighted_rows(strengths)
             .ok_or_else(|| Error::not_determined("a move has no noise"))?;
-        Ok(self.with_processes(rows.part, strengths))
+        Ok(self.with_processes(rows, strengths))
     }
 
     /// Normal equations and `Jᵀr` of some rows with those of the processes at some strengths.
     pub(super) fn with_processes(
         &self,
-        part: Part,
+        rows: Weighed,
         strengths: &Strengths,
     ) -> (Chain, DMatrix<f64>) {
-        let (mut chain, mut side) = (part.chain, part.side);
+        let mut equations = rows.equations;
         for (process, factor) in self.process.iter().zip(self.factors(strengths)) {
-            chain.add_scaled(&process.chain, factor * factor);
-            side += &process.side * (factor * factor);
+            equations.add(process, factor * factor);
         }
-        (chain, side)
+        equations.chain()
     }
 
     /// The most likely strengths, searched from the best of `starts`, with the evidence and the estimate there; the
@@ -262,13 +238,13 @@ impl Hypothesis {
     /// # Errors
     /// When there are no `starts`, or the session is undetermined there.
     pub fn tuned(mut self, starts: &[Strengths], within: &Within) -> Result<Found> {
-        let (mut strengths, _) = self.likeliest(starts, within)?;
+        let (mut strengths, _) = self.likeliest(starts, within, true)?;
         for _ in 0..RENEWALS {
             let step = -self.solved(&strengths)?.column(0);
             if !self.renew(&strengths, &step) {
                 break;
             }
-            (strengths, _) = self.likeliest(&[strengths], within)?;
+            (strengths, _) = self.likeliest(&[strengths], within, false)?;
         }
         let log_evidence = self.at_each(&[strengths])[0];
         let first = self.layout.border - self.n_added;

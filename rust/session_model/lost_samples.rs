@@ -1,7 +1,6 @@
 //! Samples lost at random behind rewritten timestamps: their number in every move is Poisson, beside noise of the moves
 //! and disturbed ones (docs/model-session.md, 11.17).
 
-use std::borrow::Cow;
 use std::iter::successors;
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector2};
@@ -128,13 +127,12 @@ impl<'a> Mixture<'a> {
             let root = covariance.cholesky()?.l().try_inverse()?;
             white.fixed_view_mut::<2, 2>(0, 0).copy_from(&root);
             let away = covariance * e.gradient;
-            let mut columns = open.columns.clone();
-            let last = columns.ncols() - 1;
+            let mut residual = open.residual();
             for row in 0..2 {
-                columns[(row, last)] += away[row] - left[row];
+                residual[row] += away[row] - left[row];
             }
             let log = e.log_likelihood + 0.5 * e.gradient.dot(&away);
-            Some((Cow::Owned(columns), white, log))
+            Some((white, Some(residual), log))
         }))
     }
 
@@ -177,9 +175,7 @@ impl<'a> Mixture<'a> {
             let disturbed: f64 = each.iter().map(|e| e.disturbed).sum();
             at.disturbed = (disturbed / (each.len() as f64 + UNDISTURBED)).clamp(1e-3, 0.5);
             let rows = self.rows(&left, &each, true).ok_or_else(undetermined)?;
-            let (chain, side) = self
-                .hypothesis
-                .with_processes(rows.part, &self.fit.strengths);
+            let (chain, side) = self.hypothesis.with_processes(rows, &self.fit.strengths);
             step = -chain.factor(RIDGE, None)?.solve(&side).column(0);
             left = self.left_by(&step);
         }
@@ -188,10 +184,10 @@ impl<'a> Mixture<'a> {
         let rows = self.rows(&left, &each, true).ok_or_else(undetermined)?;
         // A bound: where the mode is not reached yet, the curvature there would promise too much.
         let reached = self.hypothesis.beside(strengths, &rows) + value - likelihood;
-        let (chain, _) = self.hypothesis.with_processes(rows.part, strengths);
+        let (chain, _) = self.hypothesis.with_processes(rows, strengths);
         let bound = chain.factor(RIDGE, None)?.log_det();
         let rows = self.rows(&left, &each, false).ok_or_else(undetermined)?;
-        let (chain, _) = self.hypothesis.with_processes(rows.part, strengths);
+        let (chain, _) = self.hypothesis.with_processes(rows, strengths);
         let factor = chain.factor(RIDGE, None)?;
         let log_evidence = reached + 0.5 * (bound - factor.log_det());
         let mut picked = DMatrix::zeros(layout.n(), N_RATE);

@@ -11,6 +11,7 @@ pub mod candidate_gains;
 pub mod chain;
 mod elimination;
 mod ends;
+mod equations;
 pub mod factor;
 pub mod fit;
 mod fixed_weights;
@@ -34,7 +35,6 @@ mod sample_noise;
 pub mod state;
 pub mod strength_search;
 pub mod strengths;
-mod weighed_moves;
 
 use std::sync::Arc;
 

@@ -4,15 +4,18 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Strengths;
 use super::chain::Layout;
+use super::lanes::Rows;
 use super::move_rows::{MoveResidual, Passed, Whitening, with_tails};
 use super::moves::N_MOVE;
 use super::rows::Group;
 
-/// A move in SI: derivatives with respect to the border, the pose before and the pose after, and the residual, column
-/// after column; and the terms of its covariance.
+/// A move in SI: derivatives with respect to the border, followed by the residual, the pose before and the pose after;
+/// and the terms of its covariance.
 pub(super) struct Open {
     pub pose: usize,
-    pub columns: DMatrix<f64>,
+    pub edge: Rows,
+    pub here: Rows,
+    pub next: Rows,
     pub passed: Passed,
     /// The residual about which the tails of its noise are: that of the fit, or of one linear step from it.
     pub left: MoveResidual,
@@ -21,20 +24,27 @@ pub(super) struct Open {
 impl Open {
     pub(super) fn of(group: &Group, back: &Whitening, passed: &Passed) -> Self {
         let rows = &group.rows;
-        let parts = [&rows.border, &rows.here, &rows.next].map(DMatrix::as_slice);
-        let flat: Vec<f64> = parts
-            .into_iter()
-            .flatten()
-            .chain(rows.residual.as_slice())
-            .copied()
-            .collect();
-        let white = DMatrix::from_vec(N_MOVE, flat.len() / N_MOVE, flat);
+        let edge = rows.border.clone().insert_column(rows.border.ncols(), 0.0);
+        let mut edge: DMatrix<f64> = edge;
+        edge.column_mut(rows.border.ncols())
+            .copy_from(&rows.residual);
+        let in_si = |white: &DMatrix<f64>| {
+            let si = back * white;
+            Rows::from_fn(N_MOVE, white.ncols(), |r, c| si[(r, c)])
+        };
         Self {
             pose: rows.pose.unwrap_or(group.segment),
-            columns: DMatrix::from_column_slice(N_MOVE, white.ncols(), (back * &white).as_slice()),
+            edge: in_si(&edge),
+            here: in_si(&rows.here),
+            next: in_si(&rows.next),
             passed: passed.clone(),
             left: passed.carried.residual,
         }
+    }
+
+    /// Residual at the fit.
+    pub(super) fn residual(&self) -> MoveResidual {
+        MoveResidual::from_fn(|r, _| self.edge[(r, self.edge.columns() - 1)])
     }
 
     /// `L⁻¹` of its covariance `L Lᵀ` at some strengths, its weight by heavy tails, and the logarithm of that weight's
@@ -45,13 +55,18 @@ impl Open {
 
     /// The residual one linear `step` of all unknowns further.
     pub(super) fn moved(&self, layout: Layout, step: &DVector<f64>) -> MoveResidual {
-        let (b, p, at) = (layout.border, layout.pose, layout.at(self.pose));
-        let n = b + 2 * p;
-        let unknown = |c: usize| if c < b { step[c] } else { step[at + c - b] };
-        let columns = (0..n).map(|c| self.columns.fixed_view::<N_MOVE, 1>(0, c) * unknown(c));
-        columns.fold(
-            self.columns.fixed_view::<N_MOVE, 1>(0, n).into_owned(),
-            |sum, column| sum + column,
-        )
+        let at = layout.at(self.pose);
+        let parts = [
+            (&self.edge, 0, layout.border),
+            (&self.here, at, layout.pose),
+            (&self.next, at + layout.pose, layout.pose),
+        ];
+        let by_step = |r: usize| -> f64 {
+            let each = parts
+                .iter()
+                .flat_map(|&(rows, first, n)| (0..n).map(move |c| rows[(r, c)] * step[first + c]));
+            each.sum()
+        };
+        self.residual() + MoveResidual::from_fn(|r, _| by_step(r))
     }
 }

@@ -30,6 +30,8 @@ const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
     BETWEEN_AT..BETWEEN_AT + 1,
     BETWEEN_AT + 1..EXCESS_AT,
 ];
+/// Number of these that are of the moves' own strengths.
+const OF_MOVES: usize = 2;
 type Point = [f64; N_STRENGTHS];
 /// Natural logarithms between which each kind is searched. No bound on noise is physical; these end the search: a walk
 /// that equals white noise after 0.2 s, scatter of thousands of errors of a pose, rows thousands of errors off, or a
@@ -172,18 +174,23 @@ impl<'a> Search<'a> {
         }
     }
 
-    pub(super) fn run(&mut self) {
+    /// Passes over all directions until one gains nothing. Unless it is the first search, weights of moves alone were
+    /// renewed: where their own strengths gain nothing by that, the others do not.
+    pub(super) fn run(&mut self, is_first: bool) {
         let mut step = [FIRST_STEP; DIRECTIONS.len()];
         for pass in 0..MOST_PASSES {
             let before = self.value;
-            for (direction, step) in DIRECTIONS.iter().zip(&mut step) {
+            for (k, (direction, step)) in DIRECTIONS.iter().zip(&mut step).enumerate() {
+                if k == OF_MOVES && pass == 0 && !is_first && self.value - before < ENOUGH {
+                    return;
+                }
                 // Axes are changed one by one once they have been changed together.
-                let is_first = direction.start == SCATTER_AT + 1 && direction.len() == 1;
-                if self.is_free(direction.start) && !(is_first && pass == 0) {
+                let is_one_axis = direction.start == SCATTER_AT + 1 && direction.len() == 1;
+                if self.is_free(direction.start) && !(is_one_axis && pass == 0) {
                     self.along(direction, step);
                 }
             }
-            if pass == 0 {
+            if pass == 0 && is_first {
                 self.exchange();
             }
             if self.value - before < ENOUGH {

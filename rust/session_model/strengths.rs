@@ -32,8 +32,8 @@ pub fn tune(
     };
     let mut found = fit_from(session, start, None, strengths, distortion, rough)?;
     for round in 0..MOST_ROUNDS {
-        let (best, gain) =
-            Hypothesis::of(&found, &[], &[])?.likeliest(&[found.strengths], within)?;
+        let hypothesis = Hypothesis::of(&found, &[], &[])?;
+        let (best, gain) = hypothesis.likeliest(&[found.strengths], within, true)?;
         let moved = best.changed_from(&found.strengths);
         if round > 0 && gain < WORTH_A_FIT {
             break;
