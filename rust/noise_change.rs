@@ -229,7 +229,8 @@ fn interval(logs: &[Vec<f64>], noise: &[f64]) -> Option<(f64, Range, Vec<f64>)> 
         tried.sort_unstable();
         tried.dedup();
         for [first, stop] in tried {
-            if stop - first > n / 2 {
+            // A pose at the usual level gains nowhere: its interval is empty.
+            if stop == first || stop - first > n / 2 {
                 continue;
             }
             let middle =
