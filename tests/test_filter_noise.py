@@ -18,7 +18,7 @@ from trihedron.estimate.filter_noise.beside_reference import ANGLE, independent_
 from trihedron.estimate.filter_noise.findings import noticed, too_sure, unlike_this_log
 from trihedron.estimate.filter_noise.left_over import PARTS, drawn_errors, mean_square, of_temperature
 from trihedron.estimate.filter_noise.strengths import Prior, _slope, bounded, fit, height, most_likely
-from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, accumulated, errors_over, parts_of_walk, walked
+from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, errors_over, parts_of_walk
 from trihedron.estimate.filter_noise.stretches import bias_steps
 from trihedron.files.formats.filter_noise import TARGETS, filter_noise_text
 from trihedron.records import Recording, Severity
@@ -36,11 +36,9 @@ def still(m=60):
     """A stretch of a body that does not turn: means over blocks of a second, nothing constant but the start."""
     time, eye = np.arange(m) + 0.5, np.eye(3)
     steps = bias_steps(time[:, None, None] * eye)
-    walk = parts_of_walk(m, is_triangle=False)
-    noise = accumulated(walk, np.ones(m))
     return Stretch(
-        time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3),
-        (noise, 0 * noise, np.eye(m)), walked(steps), steps, None, np.tile(eye, (m, 1, 1)), np.zeros(m), walk,
+        time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3), np.eye(m), steps,
+        None, np.tile(eye, (m, 1, 1)), np.zeros(m), parts_of_walk(m, is_triangle=False),
     )  # fmt: skip
 
 
@@ -52,11 +50,11 @@ def drawn(seed, m=60):
 
 
 def test_errors_are_as_large_as_predicted_when_the_strengths_are_right():
-    nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], [5.0])[0].nees.mean() for seed in range(20)]
+    nees = [errors_over([(drawn(seed), 30)], STRENGTHS[None], [5.0])[0].nees for seed in range(20)]
     # 20 runs of about five stretches apart: 3 with a standard error of sqrt(6/100) = 0.25.
     assert np.mean(nees) == pytest.approx(3.0, abs=0.8)
     plain = np.array([N, 0.0, K, 1e-5, 0.0, 0.0, 1.0, 0.0])
-    assert errors_over([(drawn(0), 30)], plain[None], [5.0])[0].nees.mean() > 6.0
+    assert errors_over([(drawn(0), 30)], plain[None], [5.0])[0].nees > 6.0
 
 
 def test_strengths_lie_within_their_intervals():
@@ -88,8 +86,7 @@ def test_a_strength_that_is_nothing_has_an_interval_down_to_nothing():
 
 def test_the_size_of_a_bias_per_kelvin_is_found_with_the_other_strengths():
     kelvin = np.linspace(-2.0, 2.0, 60)
-    stretch = still()
-    stretch = replace(stretch, kelvin=kelvin, warmth=stretch.bias_steps @ np.kron(kelvin[:, None], np.eye(3)))
+    stretch = replace(still(), kelvin=kelvin)
     warm = np.array([1.5e-3, -1e-3, 5e-4])
     # Of a bias that grows by 4/59 K a second the angle after h is h²/2 of it.
     true = np.sum(warm**2) * (4.0 / 59.0) ** 2 * 10.0**4 / 4.0

@@ -18,7 +18,7 @@ from trihedron.estimate.filter_noise.strengths import (
     unlike_axes_beside,
     with_slow_error_of,
 )
-from trihedron.estimate.filter_noise.stretch import NAMES, Errors, Stretch, errors_over, matern
+from trihedron.estimate.filter_noise.stretch import NAMES, Stretch, errors_over, matern
 from trihedron.estimate.filter_noise.stretches import angle_stretches, velocity_stretches
 from trihedron.estimate.reference.beside import BLOCK_S
 from trihedron.estimate.reference.fit import laid_beside
@@ -237,28 +237,16 @@ def consistency(
 ) -> tuple[Nees, ...]:
     """Held-out NEES and rms over each horizon under ``taught``, and under static N and K with an exact reference."""
     found = errors_over(held, taught.draws[:: max(1, len(taught.draws) // PREDICTING)], horizons_s)
-    beside: list[Errors | None] = [None] * len(found)
-    if static is not None:
-        plain = np.zeros(len(NAMES))
-        plain[[0, 2]] = static.N.filter_value, static.K.filter_value
-        # The white error of a position is never 0: the fitted one is kept.
-        plain[3] = 0.0 if held[0][0].tilts is None else taught.mode[3]
-        exact = [(replace(one, given=None), first) for one, first in held]
-        beside = errors_over(exact, plain[None], horizons_s)
+    if static is None:
+        return tuple(found)
+    plain = np.zeros(len(NAMES))
+    plain[[0, 2]] = static.N.filter_value, static.K.filter_value
+    # The white error of a position is never 0: the fitted one is kept.
+    plain[3] = 0.0 if held[0][0].tilts is None else taught.mode[3]
+    exact = errors_over([(replace(one, white_rad=0.0), first) for one, first in held], plain[None], horizons_s)
     return tuple(
-        Nees(
-            horizon_s,
-            float(np.mean(own.nees)),
-            float(np.sqrt(own.predicted)),
-            float(np.sqrt(own.actual)),
-            len(own.nees),
-            own.n_apart,
-            None if other is None else float(np.mean(other.nees)),
-            None if other is None else float(np.sqrt(other.predicted)),
-            None if other is None else float(np.sqrt(other.actual)),
-        )
-        for horizon_s, own, other in zip(horizons_s, found, beside, strict=True)
-        if own is not None
+        replace(own, static_nees=one.nees, static_predicted=one.predicted, static_actual=one.actual)
+        for own, one in zip(found, exact, strict=True)
     )
 
 

@@ -40,12 +40,15 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
         apart = np.where(side.seen[:, None], signal - signal[side.seen].mean(axis=0), 0.0)
         return np.cumsum(np.einsum("nij,nk->nijk", C, apart).reshape(len(C), 3, 9), axis=0) * grid.step_s
 
-    S, cov = found.value(0, "S"), found.covariance(0, ("S",))
-    across = _across(S)
-    # Without its rotation a matrix has six degrees of freedom: the other three directions are excluded.
-    u, gains, _ = np.linalg.svd(across)
-    kept = u[:, gains > 0.5]
-    elements = drawn_errors(kept.T @ left_of(S), kept.T @ across @ cov @ across.T @ kept, SIZES) @ kept.T
+    S = found.value(0, "S").reshape(3, 3)
+    u, scales, vt = np.linalg.svd(S)
+    # For counts the mean scale is nominal and no error; for readings in SI the scale is 1.
+    scale = 1.0 if 0.5 < float(np.mean(scales)) < 2.0 else float(np.mean(scales))
+    # A rotation of the mounting times a symmetric matrix, of six elements.
+    every = np.eye(9).reshape(9, 3, 3)
+    kept = np.linalg.svd((u @ vt @ (every + every.swapaxes(1, 2))).reshape(9, 9))[2][:6]
+    seen, cov = kept @ (S - scale * u @ vt).ravel(), kept @ found.covariance(0, ("S",)) @ kept.T
+    elements = drawn_errors(seen, cov, SIZES) @ kept
     by: dict[Cause, tuple[FloatArray, FloatArray]] = {"calibration": (carried(grid.gyroscope), elements)}
     if side.force is not None and G_SENSITIVITY in found.places[0]:
         by["g-sensitivity"] = (carried(side.force), _g_sensitivities(found))
@@ -89,23 +92,11 @@ def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray) -> FloatA
     return np.array(out)
 
 
-def _across(S: FloatArray) -> FloatArray:
-    """(9, 9) derivative of :func:`left_of` with respect to S."""
-    step = 1e-6 * float(np.linalg.norm(S))
-    return np.array([(left_of(S + step * e) - left_of(S - step * e)) / (2.0 * step) for e in np.eye(9)]).T
-
-
-def left_of(S: FloatArray) -> FloatArray:
-    """(9,) S less the nearest orthogonal matrix times one scale; the scale is 1 for readings in SI."""
-    u, s, vt = np.linalg.svd(S.reshape(3, 3))
-    # For counts the mean scale is nominal and no error.
-    scale = 1.0 if 0.5 < float(np.mean(s)) < 2.0 else float(np.mean(s))
-    return np.asarray(S - scale * (u @ vt).ravel())
-
-
 # Bias proportional to a logged temperature: its effect on a stretch, and its share of the error.
 
 
+OF_BLOCK = (np.arange(200) + 0.5) / 200 - 0.5
+"""Parts of a block over which the temperature is averaged."""
 GROUPS = 40
 """Groups of draws with similar K: the coefficients of a group use the strengths of its median draw."""
 
@@ -114,30 +105,19 @@ def beside_temperature(stretches: Sequence[Stretch], recording: Recording) -> li
     """Stretches with a bias proportional to the logged temperature; unchanged where none was logged or its range is
     below ``LEAST_SWING_K``."""
     degrees = recording.temperature_degc
-    if degrees is None:
+    if degrees is None or np.count_nonzero(is_there := np.isfinite(degrees)) < 2:
         return list(stretches)
-    is_there = np.isfinite(degrees)
-    if np.count_nonzero(is_there) < 2:
-        return list(stretches)
-    time, value = recording.time_s[is_there], degrees[is_there]
-    heated = np.append(0.0, np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(time)))
-
-    def mean_of_blocks(at: FloatArray) -> FloatArray:
-        # Block means reduce the thermometer's noise and resolution.
-        half = 0.5 * float(np.median(np.diff(at)))
-        first, last = np.clip(at - half, time[0], time[-1]), np.clip(at + half, time[0], time[-1])
-        covered = np.maximum(last - first, 1e-9)
-        return np.asarray((np.interp(last, time, heated) - np.interp(first, time, heated)) / covered)
-
-    of_stretches = [mean_of_blocks(one.time_s) for one in stretches]
-    every = np.concatenate(of_stretches)
+    # Block means reduce the thermometer's noise and resolution.
+    means = [
+        np.interp(one.time_s[:, None] + one.step_s * OF_BLOCK, recording.time_s[is_there], degrees[is_there]).mean(
+            axis=1
+        )
+        for one in stretches
+    ]
+    every = np.concatenate(means)
     if np.ptp(every) < LEAST_SWING_K:
         return list(stretches)
-    of_stretches = [kelvin - every.mean() for kelvin in of_stretches]
-    return [
-        replace(one, kelvin=kelvin, warmth=one.bias_steps @ np.kron(kelvin[:, None], np.eye(3)))
-        for one, kelvin in zip(stretches, of_stretches, strict=True)
-    ]
+    return [replace(one, kelvin=kelvin - every.mean()) for one, kelvin in zip(stretches, means, strict=True)]
 
 
 def of_temperature(stretches: Sequence[Stretch], found: Fitted, horizons_s: Sequence[float]) -> Left:
@@ -182,7 +162,7 @@ def _since_start(stretch: Stretch, horizon_s: float) -> FloatArray:
     """(n, 3, 3) derivative, by the bias per kelvin, of the error over a horizon from each of n starts."""
     assert stretch.kelvin is not None
     m = len(stretch.time_s)
-    ahead = max(1, round(horizon_s / float(np.median(np.diff(stretch.time_s)))))
+    ahead = max(1, round(horizon_s / stretch.step_s))
     own = stretch.bias_steps.reshape(m, 3, m, 3)[-1].transpose(1, 0, 2)[:-1]
     zero = np.zeros((1, 3, 3))
     plain, warm = (

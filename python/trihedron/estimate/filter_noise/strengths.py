@@ -212,7 +212,7 @@ def forgetting(stretches: Sequence[Stretch], walk: Fitted) -> tuple[float, float
     at = NAMES.index("bias_walk")
     best = (-np.inf, 0.0, 0.0)
     for tau in TIMES_S:
-        one = [stretch.with_gauss_markov(tau) for stretch in stretches]
+        one = [replace(stretch, forgets_s=tau) for stretch in stretches]
         middle = walk.mode[at] * np.sqrt(0.5 * tau)
         for size in middle * np.geomspace(1.0 / 30.0, 30.0, 13):
             strengths = walk.mode.copy()
@@ -267,8 +267,8 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
 def _of_axes(stretch: Stretch, strengths: FloatArray) -> FloatArray:
     """(3, 3 m, 3 m) covariance of noise and vibration of each body axis, in the reference's world frame."""
     m, n = len(stretch.time_s), len(stretch.power)
-    h = float(np.median(np.diff(stretch.time_s)))
-    size = np.sqrt(np.outer(h * (strengths[0] ** 2 + strengths[1] ** 2 * stretch.power), WEIGHTS)).ravel()
+    density = stretch.step_s * (strengths[0] ** 2 + strengths[1] ** 2 * stretch.power)
+    size = np.sqrt(np.outer(density, WEIGHTS)).ravel()
     # The attitude in a block; of velocities, at its end.
     attitude = np.repeat(stretch.attitude[np.minimum(np.arange(n), m - 1)], len(WEIGHTS), axis=0)
     out = []

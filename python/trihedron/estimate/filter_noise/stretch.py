@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import cholesky, qr, solve_triangular
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.records.filter_noise import Nees
 
 AnyFloats = np.ndarray[Any, np.dtype[Any]]
 
@@ -30,74 +31,92 @@ NODES, WEIGHTS = (np.polynomial.legendre.leggauss(3) + np.array([[1.0], [0.0]]))
 class Stretch:
     """Observations ``observed`` (3 m,) at ``time_s`` (m,); ``columns`` (3 m, p) scaled to a prior σ of 1.
 
-    ``centre`` (p,) is the prior mean; ``alike`` the covariances (m, m), equal on every axis, of noise, vibration and
-    white error of the reference for strength 1; ``bias_walk`` (3 m, 3 m) that of the bias random walk; ``tilts``
-    (m, 3, 3) the increment that an attitude error in the world frame adds to an observation and to all later ones, None
-    where the observation is the angle itself; ``given`` (3 m, 3 m) a known covariance, or None; ``attitude`` (m, 3, 3)
-    body to world; ``bias_steps`` (3 m, 3 m) the derivative of the observations with respect to the bias in each block;
-    ``power`` (n,) that of vibration in each block, with mean 1; ``walk`` (m, 3 n) as `parts_of_walk`; ``kelvin`` (m,)
-    the logged temperature less its mean, and ``warmth`` (3 m, 3) the derivative of the observations by the bias per
-    kelvin, or None; ``quietest`` [SI/√Hz] the noise density of the log's quietest block, above the band: static
-    noise and vibration.
+    ``centre`` (p,) is the prior mean; ``white`` (m, m) the covariance, equal on every axis, of a white error of the
+    reference of strength 1; ``bias_steps`` (3 m, 3 n) the derivative of the observations with respect to the bias in
+    each block; ``tilts`` (m, 3, 3) the increment that an attitude error in the world frame adds to an observation and
+    to all later ones, None where the observation is the angle itself; ``attitude`` (m, 3, 3) body to world; ``power``
+    (n,) that of vibration in each block, with mean 1; ``walk`` (m, 3 n) as `parts_of_walk`; ``white_rad`` a known white
+    error of the attitude in each block; ``kelvin`` (n,) the logged temperature less its mean, or None; ``quietest``
+    [SI/√Hz] the noise density of the log's quietest block, above the band: static noise and vibration; ``forgets_s``
+    the correlation time of a Gauss-Markov bias, whose strength is its stationary σ [SI], 0 for a random walk.
     """
 
     time_s: FloatArray
     observed: FloatArray
     columns: FloatArray
     centre: FloatArray
-    alike: tuple[AnyFloats, ...]
-    bias_walk: AnyFloats
+    white: AnyFloats
     bias_steps: FloatArray
     tilts: FloatArray | None
     attitude: FloatArray
     power: FloatArray
     walk: FloatArray
+    white_rad: float = 0.0
     kelvin: FloatArray | None = None
-    warmth: FloatArray | None = None
-    given: AnyFloats | None = None
     quietest: float = 0.0
+    forgets_s: float = 0.0
+
+    @cached_property
+    def step_s(self) -> float:
+        """Time between the observations [s]."""
+        return float(np.median(np.diff(self.time_s)))
+
+    @cached_property
+    def alike(self) -> tuple[AnyFloats, ...]:
+        """(m, m) covariances, equal on every axis, of noise, vibration and white error of strength 1."""
+        noise, vibration = (self.accumulated(each) for each in (np.ones(len(self.power)), self.power))
+        return noise, vibration, self.white
+
+    def accumulated(self, density: FloatArray) -> FloatArray:
+        """(m, m) covariance of observations of a random walk with a variance ``density`` (n,) per second in a block."""
+        return np.asarray((self.walk * np.outer(self.step_s * density, WEIGHTS).ravel()) @ self.walk.T)
+
+    @cached_property
+    def bias_walk(self) -> AnyFloats:
+        """(3 m, 3 m) covariance by the bias of strength 1."""
+        n = self.bias_steps.shape[1] // 3
+        at = self.step_s * np.arange(1, n + 1)
+        kernel = np.minimum.outer(at, at)
+        if self.forgets_s:
+            kernel = np.exp(-np.abs(np.subtract.outer(at, at)) / self.forgets_s)
+        return self.bias_steps @ np.kron(kernel, np.eye(3)) @ self.bias_steps.T
+
+    @cached_property
+    def warmth(self) -> FloatArray | None:
+        """(3 m, 3) derivative of the observations by the bias per kelvin."""
+        return None if self.kelvin is None else self.bias_steps @ np.kron(self.kelvin[:, None], np.eye(3))
 
     @cached_property
     def tilted(self) -> tuple[FloatArray, FloatArray]:
-        """(m, 3, m, 3) covariances of the increments for a unit attitude error, world-fixed and body-fixed."""
-        assert self.tilts is not None
-        own = self.tilts @ self.attitude
-        world, body = (np.asarray(np.einsum("kij,lmj->kilm", by, by)) for by in (self.tilts, own))
+        """(m, 3, m, 3) covariances, of increments, for a unit attitude error, world-fixed and body-fixed."""
+        added = np.tile(np.eye(3), (len(self.time_s), 1, 1)) if self.tilts is None else self.tilts
+        world, body = (np.asarray(np.einsum("kij,lmj->kilm", by, by)) for by in (added, added @ self.attitude))
         return world, body
-
-    @cached_property
-    def turned(self) -> FloatArray:
-        """(m, 3, m, 3) products C_k C_lᵀ of the body's attitudes at blocks k and l."""
-        return np.asarray(np.einsum("kij,lmj->kilm", self.attitude, self.attitude))
-
-    @cached_property
-    def lag_s(self) -> FloatArray:
-        """(m, m) time differences between the observations [s]."""
-        return np.abs(np.subtract.outer(self.time_s, self.time_s))
 
     def covariance(self, strengths: FloatArray) -> FloatArray:
         """Covariance (3 m, 3 m) of all random errors under ``strengths`` (8,) in SI; a strength may be 0."""
         s = dict(zip(NAMES, strengths, strict=True))
         m = len(self.time_s)
         # An observation is a mean over a block; of a velocity's increment over a triangle, as wide as √2 blocks.
-        width_s = float(np.median(np.diff(self.time_s))) * (1.0 if self.tilts is None else np.sqrt(2.0))
-        correlation = matern_of_means(self.lag_s, float(s["slow_s"]), width_s)
+        width_s = self.step_s * (1.0 if self.tilts is None else np.sqrt(2.0))
+        lag_s = np.subtract.outer(self.time_s, self.time_s)
         out = s["bias_walk"] ** 2 * self.bias_walk
         parted = out.reshape(m, 3, m, 3)
-        same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
-        if self.tilts is None:
-            same = same + s["world"] ** 2 * correlation
-            if s["body"] > 0.0:
-                parted += s["body"] ** 2 * correlation[:, None, :, None] * self.turned
-        elif s["world"] > 0.0 or s["body"] > 0.0:
+        if s["world"] > 0.0 or s["body"] > 0.0:
             world, body = self.tilted
-            added = correlation[:, None, :, None] * (s["world"] ** 2 * world + s["body"] ** 2 * body)
-            parted += np.cumsum(np.cumsum(added, axis=0), axis=2)
+            slow = matern_of_means(lag_s, float(s["slow_s"]), width_s)[:, None, :, None]
+            slow = slow * (s["world"] ** 2 * world + s["body"] ** 2 * body)
+            parted += slow if self.tilts is None else np.cumsum(np.cumsum(slow, axis=0), axis=2)
+        same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
         for axis in range(3):
             parted[:, axis, :, axis] += same
         if self.warmth is not None:
             out += s["per_kelvin"] ** 2 * self.warmth @ self.warmth.T
-        return np.asarray(out if self.given is None else out + self.given)
+        if self.tilts is not None:
+            # A white attitude error is a white acceleration, |f| times it.
+            across = self.white_rad**2 * np.einsum("kij,klj->il", self.tilts, self.tilts) / m
+            out += np.kron(self.alike[0] / self.step_s, across)
+        return np.asarray(out)
 
     def evidence(self, strengths: FloatArray) -> float:
         """Log evidence of the observations, the columns' coefficients integrated out (docs/reference.md, eq. 2)."""
@@ -130,31 +149,18 @@ class Stretch:
 
     def part(self, first: int, last: int) -> Stretch:
         """The stretch of blocks ``first`` to ``last`` (exclusive)."""
-        rows = slice(3 * first, 3 * last)
-        at = slice(first, last)
+        rows, at = slice(3 * first, 3 * last), slice(first, last)
         return replace(
             self,
             time_s=self.time_s[at],
             observed=self.observed[rows],
             columns=self.columns[rows],
-            alike=tuple(basis[at, at] for basis in self.alike),
-            bias_walk=self.bias_walk[rows, rows],
+            white=self.white[at, at],
             bias_steps=self.bias_steps[rows],
             tilts=None if self.tilts is None else self.tilts[at],
-            given=None if self.given is None else self.given[rows, rows],
             attitude=self.attitude[at],
             walk=self.walk[at],
-            kelvin=None if self.kelvin is None else self.kelvin[at],
-            warmth=None if self.warmth is None else self.warmth[rows],
         )
-
-    def with_gauss_markov(self, correlation_time_s: float) -> Stretch:
-        """The stretch with a Gauss-Markov bias of this correlation time [s]; its strength is the stationary σ [SI]."""
-        steps = self.bias_steps.shape[1] // 3
-        h = float(np.median(np.diff(self.time_s)))
-        lag = np.abs(np.subtract.outer(np.arange(steps), np.arange(steps))) * h
-        kernel = np.kron(np.exp(-lag / correlation_time_s), np.eye(3))
-        return replace(self, bias_walk=self.bias_steps @ kernel @ self.bias_steps.T)
 
 
 def matern(lag_s: FloatArray | float, tau_s: FloatArray | float) -> FloatArray:
@@ -187,65 +193,39 @@ def parts_of_walk(n: int, *, is_triangle: bool) -> FloatArray:
     return out.reshape(m, -1)
 
 
-def accumulated(walk: FloatArray, per_block: FloatArray) -> FloatArray:
-    """(m, m) covariance of observations of a random walk whose variance grows by ``per_block`` (n,) in each block."""
-    return np.asarray((walk * np.outer(per_block, WEIGHTS).ravel()) @ walk.T)
-
-
-def walked(steps: FloatArray) -> FloatArray:
-    """Covariance (3 m, 3 m) from a bias random walk with unit steps per block; ``steps`` as ``Stretch.bias_steps``."""
-    # A step at block j persists in all later blocks: cumulative sums from the end.
-    m = steps.shape[1] // 3
-    carried = np.cumsum(steps.reshape(len(steps), m, 3)[:, ::-1], axis=1)[:, ::-1].reshape(len(steps), -1)
-    return np.asarray(carried @ carried.T)
-
-
 # Errors of a filter without updates over a horizon, against the covariance that it predicts.
 
 
-@dataclass(frozen=True, eq=False)
-class Errors:
-    """NEES (n,) of all starts, mean squares of actual and predicted error [SI²], number of starts without overlap."""
-
-    nees: FloatArray
-    actual: float
-    predicted: float
-    n_apart: int
-
-
-def errors_over(
-    stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, horizons_s: Sequence[float]
-) -> list[Errors | None]:
+def errors_over(stretches: Sequence[tuple[Stretch, int]], draws: FloatArray, horizons_s: Sequence[float]) -> list[Nees]:
     """Errors over each horizon predicted from all earlier observations; of each stretch from block ``first`` on.
 
     With V = L Lᵀ and w = L⁻¹y the prediction of observation j from those up to k is L[j, :k] w[:k], its covariance
     L[j, k:j] L[j, k:j]ᵀ: one factor gives the filter over every horizon. Means and covariances are those of the mixture
-    over ``draws`` (d, 8) of the strengths. None where no stretch is long enough.
+    over ``draws`` (d, 8) of the strengths. A horizon for which no stretch is long enough is left out.
     """
     found: list[list[tuple[FloatArray, FloatArray, int]]] = [[] for _ in horizons_s]
     for stretch, first in stretches:
-        n, step_s = len(stretch.time_s), float(np.median(np.diff(stretch.time_s)))
-        ahead = [max(1, round(h / step_s)) for h in horizons_s]
-        targets = [np.arange(max(first, a + 2) + a - 1, n) for a in ahead]
+        ahead = [max(1, round(h / stretch.step_s)) for h in horizons_s]
+        targets = [np.arange(max(first, a + 2) + a - 1, len(stretch.time_s)) for a in ahead]
         every = []
         for strengths in draws:
             factor = stretch.factor(strengths)
             every.append([_ahead(*factor, a, some) for a, some in zip(ahead, targets, strict=True)])
-        for k, (a, some) in enumerate(zip(ahead, targets, strict=True)):
-            if len(some):
-                errors, covariances = (np.array([one[k][part] for one in every]) for part in (0, 1))
-                middle = errors.mean(axis=0)
-                apart = np.einsum("dni,dnj->nij", errors - middle, errors - middle) / len(draws)
-                found[k].append((middle, covariances.mean(axis=0) + apart, -(-len(some) // a)))
-    return [_errors(parts) if parts else None for parts in found]
+        for parts, a, of_draws in zip(found, ahead, zip(*every, strict=True), strict=True):
+            errors, covariances = (np.array(one) for one in zip(*of_draws, strict=True))
+            middle = errors.mean(axis=0)
+            apart = np.einsum("dni,dnj->nij", errors - middle, errors - middle) / len(draws)
+            parts.append((middle, covariances.mean(axis=0) + apart, -(-len(middle) // a)))
+    return [_nees(h, parts) for h, parts in zip(horizons_s, found, strict=True) if any(one[2] for one in parts)]
 
 
-def _errors(parts: Sequence[tuple[FloatArray, FloatArray, int]]) -> Errors:
-    """Errors (n, 3), their covariances (n, 3, 3) and numbers of starts without overlap of all stretches as one."""
+def _nees(horizon_s: float, parts: Sequence[tuple[FloatArray, FloatArray, int]]) -> Nees:
+    """NEES from errors (n, 3), their covariances (n, 3, 3) and numbers of starts without overlap of all stretches."""
     error, covariance = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
     nees = np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[:, :, None])[:, :, 0])
-    predicted = float(np.trace(covariance, axis1=1, axis2=2).mean())
-    return Errors(nees, float(np.sum(error**2, axis=1).mean()), predicted, sum(part[2] for part in parts))
+    predicted = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()))
+    actual = float(np.sqrt(np.sum(error**2, axis=1).mean()))
+    return Nees(horizon_s, float(nees.mean()), predicted, actual, len(nees), sum(part[2] for part in parts))
 
 
 def _ahead(L: FloatArray, w: FloatArray, ahead: int, targets: IntArray) -> tuple[FloatArray, FloatArray]:
