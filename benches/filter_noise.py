@@ -163,7 +163,7 @@ def backwards(path, motion, asked):
     half, held = halves(stretches)
     later = [one.part(first, len(one.time_s)) for one, first in held]
     for named, taught_by, test in (("second from first", half, held), ("first from second", later, half)):
-        fitted, _ = independent_or_not(taught_by, informed(ANGLE, stretches, ADIS16448), ANGLE)
+        fitted = independent_or_not(taught_by, informed(ANGLE, stretches, ADIS16448), ANGLE)
         # Separate parts: a filter that begins there has no estimate from the other half.
         parts = test if test is held else [(one, 0) for one in test]
         every = consistency(parts, fitted, ADIS16448, asked.horizons_s)

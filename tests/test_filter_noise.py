@@ -109,10 +109,10 @@ def test_a_reference_that_follows_the_sensor_does_not_lower_its_noise():
     static = StaticNoise(Bounded(N, 0.9 * N, 1.1 * N), Bounded(K, K, K))
     prior = informed(ANGLE, [stretch], static)
     plain = replace(prior, is_there=np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]))
-    fitted, follows = independent_or_not([stretch], plain, ANGLE)
-    assert follows
+    fitted = independent_or_not([stretch], plain, ANGLE)
+    assert fitted.follows
     assert np.median(fitted.draws[:, 0]) < 0.5 * N
-    assert not independent_or_not([drawn(6)], plain, ANGLE)[1]
+    assert not independent_or_not([drawn(6)], plain, ANGLE).follows
 
 
 def test_parts_of_an_error_are_the_textbook_ones():

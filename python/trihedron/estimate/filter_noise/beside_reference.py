@@ -48,7 +48,7 @@ ANGLE = Prior(
 """Prior for consumer gyros and optical trackers: factor 30 either way, 4 for the time constant (as `--reference`)."""
 VELOCITY = replace(ANGLE, mean=np.array([*np.log([2e-3, 2e-3, 3e-4, 1e-3, 1e-3, 8.0]), 0.0, np.log(PER_KELVIN[0])]))
 """Prior for accelerometers with a reference position: 1 mm of white error; the slow error is that of the attitude and
-gets its prior from the gyro's fit (`Learnt.told`)."""
+gets its prior from the gyro's fit (`with_slow_error_of`)."""
 LEAST_S = 40.0
 """Shortest shared motion: in less, the halves do not validate predictions over 10 s."""
 UNTURNED = np.ones(2)
@@ -90,71 +90,47 @@ def beside_reference(
         )
     left = left_over(found, asked.horizons_s)
     of_gyro = learnt(stretches, (ANGLE, ANGLE), asked.gyroscope)
-    out = [_sensor(of_gyro, asked, asked.gyroscope, left)]
+    out = [_sensor(stretches, of_gyro, asked, left)]
     if motion.position is not None and side.force is not None:
         known = 0.0 if asked.accelerometer is None else asked.accelerometer.N.value
-        assert out[0].reference is not None
-        white = out[0].reference.white.value
+        white = bounded(of_gyro[1].draws[:, NAMES.index("white")]).value
         more = velocity_stretches(side, found.points[0], asked.band_hz, known, asked.gravity_m_s2, white)
         more = beside_temperature(more, recording)
-        of_force = learnt(more, of_gyro.told(VELOCITY), asked.accelerometer)
-        out.append(_sensor(of_force, asked, asked.accelerometer, {}, white))
+        # Where the reference was computed from the gyro, common errors cancel in the difference.
+        half, every = (VELOCITY if one.follows else with_slow_error_of(VELOCITY, one.draws) for one in of_gyro)
+        out.append(_sensor(more, learnt(more, (half, every), asked.accelerometer), asked, {}, white))
     error = error_of(found)
     return tuple(out), tuple(of_error(error, slip_of(found, 0, error), is_of_noise=True))
 
 
-@dataclass(frozen=True, eq=False)
-class Learnt:
-    """Fits of a sensor: ``taught`` on the first half, ``found`` on all stretches, each with whether the reference
-    follows the sensor; ``held`` as `halves` returns it; ``prior`` of the fit on all."""
-
-    stretches: Sequence[Stretch]
-    held: list[tuple[Stretch, int]]
-    taught: tuple[Fitted, bool]
-    found: tuple[Fitted, bool]
-    prior: Prior
-
-    def told(self, usual: Prior) -> tuple[Prior, Prior]:
-        """Priors, of the half and of all, for another sensor: its slow error of the reference from this sensor's fit.
-
-        ``usual`` is kept where the reference was computed from this sensor: common errors cancel in the difference.
-        """
-        half, whole = (
-            usual if follows else with_slow_error_of(usual, fitted.draws)
-            for fitted, follows in (self.taught, self.found)
-        )
-        return half, whole
-
-
-def learnt(stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: StaticNoise | None) -> Learnt:
+def learnt(
+    stretches: Sequence[Stretch], usual: tuple[Prior, Prior], static: StaticNoise | None
+) -> tuple[Fitted, Fitted]:
     """Fits on the first half and on all stretches, under their ``usual`` priors and the static noise."""
-    half, held = halves(stretches)
-    of_half, of_all = (informed(one, stretches, static) for one in usual)
-    return Learnt(
-        stretches,
-        held,
-        independent_or_not(half, of_half, usual[0]),
-        independent_or_not(stretches, of_all, usual[1]),
-        of_all,
+    half, whole = (
+        independent_or_not(some, informed(one, stretches, static), one)
+        for some, one in zip((halves(stretches)[0], stretches), usual, strict=True)
     )
+    return half, whole
 
 
 def _sensor(
-    learnt: Learnt, asked: Request, static: StaticNoise | None, left: Left, white_rad: float = 0.0
+    stretches: Sequence[Stretch], fits: tuple[Fitted, Fitted], asked: Request, left: Left, white_rad: float = 0.0
 ) -> SensorFilterNoise:
-    stretches, taught, (found, follows) = learnt.stretches, learnt.taught[0], learnt.found
+    (taught, found), quietest = fits, stretches[0].quietest
     is_gyro = stretches[0].tilts is None
+    static = asked.gyroscope if is_gyro else asked.accelerometer
     gain, sigma, tau = forgetting(stretches, found)
     is_gm = gain > PREFERRED
-    draws = found.draws
-    N, K = bounded(np.hypot(draws[:, 0], draws[:, 1])), bounded(draws[:, 2])
-    if follows:
+    s = dict(zip(NAMES, found.draws.T, strict=True))
+    N, K = bounded(np.hypot(s["noise"], s["vibration"])), bounded(s["bias_walk"])
+    if found.follows:
         # The difference contains the reference's error as much as the sensor's: N is the static one.
         assert static is not None
         N, K = static.N, replace(K, lower=0.0, is_limit=True)
-    if static is None and N.upper < stretches[0].quietest:
+    if static is None and N.upper < quietest:
         # The quietest second contains the static noise; a reference computed from these readings hides part of it.
-        N = Bounded(N.value, N.lower, stretches[0].quietest, True)
+        N = Bounded(N.value, N.lower, quietest, True)
     tilt = None if is_gyro else asked.gravity_m_s2 * np.array([1.0, white_rad * np.sqrt(BLOCK_S)])
     # Of a horizon longer than every stretch nothing is seen.
     longest_s = max(float(one.time_s[-1] - one.time_s[0]) for one in stretches)
@@ -164,9 +140,10 @@ def _sensor(
         share
         for h in horizons
         for share in shares_over(
-            {**parts_of(draws, h, tilt, turned_alike(stretches, h)), **left.get(h, {}), **warm.get(h, {})}, h
+            {**parts_of(found.draws, h, tilt, turned_alike(stretches, h)), **left.get(h, {}), **warm.get(h, {})}, h
         )
     )
+    slow = bounded(np.hypot(s["world"], s["body"]))
     return SensorFilterNoise(
         sensor="gyroscope" if is_gyro else "accelerometer",
         unit="rad/s" if is_gyro else "m/s^2",
@@ -174,14 +151,14 @@ def _sensor(
         K=K,
         static=static,
         bias=BiasModel("gauss-markov", gain, sigma, tau) if is_gm else BiasModel("walk", gain),
-        axes_N=() if follows else unlike_axes_beside(stretches, found, N),
-        vibration=bounded(draws[:, 1]) if learnt.prior.is_there[1] and not follows else None,
-        reference=_worth(draws, follows),
+        axes_N=() if found.follows else unlike_axes_beside(stretches, found, N),
+        vibration=bounded(s["vibration"]) if np.any(s["vibration"]) and not found.follows else None,
+        reference=ReferenceWorth(bounded(s["white"]), slow, float(np.median(s["slow_s"])), found.follows),
         shares=shares,
-        consistency=consistency(learnt.held, taught, static, asked.horizons_s),
+        consistency=consistency(halves(stretches)[1], taught, static, asked.horizons_s),
         is_settled=found.is_settled and taught.is_settled,
-        quietest=stretches[0].quietest,
-    )  # fmt: skip
+        quietest=quietest,
+    )
 
 
 def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | None) -> Prior:
@@ -201,35 +178,26 @@ def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | N
     return replace(usual, mean=mean, sigma=sigma, is_there=is_there)
 
 
-def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior) -> tuple[Fitted, bool]:
-    """The fit with the static N as a datum, or the fit without it where the evidence prefers that; and which it is.
+def independent_or_not(stretches: Sequence[Stretch], prior: Prior, usual: Prior) -> Fitted:
+    """The fit with the static N as a datum, or the fit without it where the evidence prefers that.
 
     A reference smoothed from this sensor repeats part of its noise: N of the difference is then below the static N.
     """
     apart = fit(stretches, prior)
     if prior.sigma[0] == usual.sigma[0] or np.log(np.median(apart.draws[:, 0])) > prior.mean[0] - prior.sigma[0]:
-        return apart, False
+        return apart
     wide = prior.sigma.copy()
     wide[0] = usual.sigma[0]
     other = fit(stretches, replace(prior, sigma=wide))
-    follows = 2.0 * (other.evidence - apart.evidence) > PREFERRED
-    return (other, True) if follows else (apart, False)
+    return replace(other, follows=True) if 2.0 * (other.evidence - apart.evidence) > PREFERRED else apart
 
 
 def halves(stretches: Sequence[Stretch]) -> tuple[list[Stretch], list[tuple[Stretch, int]]]:
     """Stretches of the first half of the time, for the fit, and stretches with their first held-out block."""
-    total = sum(len(one.time_s) for one in stretches)
-    learnt: list[Stretch] = []
-    held, so_far = [], 0
-    for one in stretches:
-        n = len(one.time_s)
-        cut = min(max(total // 2 - so_far, 0), n)
-        if cut >= 2:
-            learnt.append(one if cut == n else one.part(0, cut))
-        if cut < n:
-            held.append((one, cut))
-        so_far += n
-    return learnt, held
+    n = np.array([len(one.time_s) for one in stretches])
+    cuts = np.clip(n.sum() // 2 - (np.cumsum(n) - n), 0, n).tolist()
+    learnt = [one.part(0, cut) for one, cut in zip(stretches, cuts, strict=True) if cut >= 2]
+    return learnt, [(one, cut) for one, cut in zip(stretches, cuts, strict=True) if cut < len(one.time_s)]
 
 
 def consistency(
@@ -248,11 +216,6 @@ def consistency(
         replace(own, static_nees=one.nees, static_predicted=one.predicted, static_actual=one.actual)
         for own, one in zip(found, exact, strict=True)
     )
-
-
-def _worth(draws: FloatArray, follows: bool) -> ReferenceWorth:
-    slow = np.hypot(draws[:, 4], draws[:, 5])
-    return ReferenceWorth(bounded(draws[:, 3]), bounded(slow), float(np.median(draws[:, 6])), follows)
 
 
 # Shares of the error over a horizon (docs/filter-noise.md).
@@ -292,10 +255,9 @@ def shares_over(parts: dict[Cause, FloatArray], horizon_s: float) -> tuple[Share
 def turned_alike(stretches: Sequence[Stretch], horizon_s: float) -> FloatArray:
     """(n,) mean correlation, in the world frame, of a body-fixed vector after times from 0 to ``horizon_s``: trace/3 of
     the rotation, averaged over all starts."""
-    step_s = float(np.median(np.diff(stretches[0].time_s)))
     alike = []
-    for ahead in range(max(1, round(horizon_s / step_s)) + 1):
-        pairs = [(one.attitude[ahead:], one.attitude[: max(len(one.attitude) - ahead, 0)]) for one in stretches]
+    for ahead in range(max(1, round(horizon_s / stretches[0].step_s)) + 1):
+        pairs = [(one.attitude[ahead:], one.attitude[: len(one.attitude[ahead:])]) for one in stretches]
         starts = sum(len(later) for later, _ in pairs)
         alike.append(sum(float(np.sum(later * before)) for later, before in pairs) / (3.0 * max(starts, 1)))
     return np.array(alike)

@@ -66,12 +66,13 @@ class Prior:
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """Strengths (8,) in SI at the posterior maximum, log evidence of the model, posterior draws (k, 8) of the
-    strengths, and their effective number."""
+    strengths, and their effective number; ``follows``: the reference repeats this sensor's noise."""
 
     mode: FloatArray
     evidence: float
     draws: FloatArray
     n_effective: float
+    follows: bool = False
 
     @property
     def is_settled(self) -> bool:

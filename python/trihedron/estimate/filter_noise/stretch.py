@@ -88,10 +88,18 @@ class Stretch:
 
     @cached_property
     def tilted(self) -> tuple[FloatArray, FloatArray]:
-        """(m, 3, m, 3) covariances, of increments, for a unit attitude error, world-fixed and body-fixed."""
+        """(3 m, 3 m) covariances, of increments, for a unit attitude error, world-fixed and body-fixed."""
         added = np.tile(np.eye(3), (len(self.time_s), 1, 1)) if self.tilts is None else self.tilts
-        world, body = (np.asarray(np.einsum("kij,lmj->kilm", by, by)) for by in (added, added @ self.attitude))
-        return world, body
+        world, body = added.reshape(-1, 3), (added @ self.attitude).reshape(-1, 3)
+        return world @ world.T, body @ body.T
+
+    @cached_property
+    def given(self) -> AnyFloats | float:
+        """(3 m, 3 m) covariance of a velocity by the known white attitude error: white acceleration, |f| times it."""
+        if self.tilts is None:
+            return 0.0
+        across = np.einsum("kij,klj->il", self.tilts, self.tilts) / len(self.tilts) * self.white_rad**2
+        return np.kron(self.alike[0] / self.step_s, across)
 
     def covariance(self, strengths: FloatArray) -> FloatArray:
         """Covariance (3 m, 3 m) of all random errors under ``strengths`` (8,) in SI; a strength may be 0."""
@@ -104,19 +112,15 @@ class Stretch:
         parted = out.reshape(m, 3, m, 3)
         if s["world"] > 0.0 or s["body"] > 0.0:
             world, body = self.tilted
-            slow = matern_of_means(lag_s, float(s["slow_s"]), width_s)[:, None, :, None]
-            slow = slow * (s["world"] ** 2 * world + s["body"] ** 2 * body)
+            slow = matern_of_means(lag_s, float(s["slow_s"]), width_s).repeat(3, axis=0).repeat(3, axis=1)
+            slow = (slow * (s["world"] ** 2 * world + s["body"] ** 2 * body)).reshape(parted.shape)
             parted += slow if self.tilts is None else np.cumsum(np.cumsum(slow, axis=0), axis=2)
         same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
         for axis in range(3):
             parted[:, axis, :, axis] += same
         if self.warmth is not None:
             out += s["per_kelvin"] ** 2 * self.warmth @ self.warmth.T
-        if self.tilts is not None:
-            # A white attitude error is a white acceleration, |f| times it.
-            across = self.white_rad**2 * np.einsum("kij,klj->il", self.tilts, self.tilts) / m
-            out += np.kron(self.alike[0] / self.step_s, across)
-        return np.asarray(out)
+        return np.asarray(out + self.given)
 
     def evidence(self, strengths: FloatArray) -> float:
         """Log evidence of the observations, the columns' coefficients integrated out (docs/reference.md, eq. 2)."""
