@@ -40,11 +40,11 @@ class Solution:
     rms_held_out: float
 
 
-def solve(design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray) -> Solution:
+def solve(design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray | None = None) -> Solution:
     """Estimate θ of ``target (k, 3) = design (k, 3, p) θ``.
 
-    ``index`` (k,) numbers the windows, gaps included; ``size`` (k,) is the motion with which noise may grow. Raises
-    ``InputError`` when there are too few rows for the parameters.
+    ``index`` (k,) numbers the windows, gaps included; ``size`` (k,) is the motion with which noise may grow, without
+    which it is white and constant. Raises ``InputError`` when there are too few rows for the parameters.
     """
     k, _, p = design.shape
     if 3 * k < 2 * p + 30:
@@ -53,8 +53,8 @@ def solve(design: FloatArray, target: FloatArray, index: IntArray, size: FloatAr
     scale[scale == 0.0] = 1.0
     X = design / scale
     orders = [order for order in ORDERS if order * ROWS_PER_POLE <= k]
-    tried = [_solve(X, target, index, motion, order) for motion in (None, size) for order in orders]
-    found = min(tried, key=lambda one: one[0])[1]
+    models = [(None, 0)] if size is None else [(motion, order) for motion in (None, size) for order in orders]
+    found = min((_solve(X, target, index, *one) for one in models), key=lambda one: one[0])[1]
     theta, covariance = found.theta / scale, found.covariance / np.outer(scale, scale)
     return replace(found, theta=theta, covariance=covariance, influence=found.influence / scale[:, None, None])
 

@@ -112,14 +112,19 @@ def _fitted(sides: list[Beside]) -> tuple[MotionFit, list[Scored]]:
     return found, effects
 
 
-def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float) -> Prepared:
+def _begun(recording: Recording, motion: ReferenceMotion) -> tuple[Grid, Reference, Alignment, BoolArray, Start]:
+    """The log on its grid, its reference, the clocks' alignment, where both are seen, and a first gyro."""
     grid, reference = grid_of(recording), Reference(motion)
     found = align(grid, reference, _stamped(recording, motion))
     time = grid.time_s * (1.0 + found.rate) + found.offset_s
     seen = grid.is_valid & reference.covers(time)
     if motion.is_stepwise:
         seen &= plateaus(grid, reference, time)
-    gyro = start_of(grid, reference, seen, found)
+    return grid, reference, found, seen, start_of(grid, reference, seen, found)
+
+
+def _prepared(recording: Recording, motion: ReferenceMotion, gravity_m_s2: float) -> Prepared:
+    grid, reference, found, seen, gyro = _begun(recording, motion)
     reference, gyro, is_turned = _right_way_round(grid, reference, seen, gyro)
     motion = reference.motion
     reject_strangers(gyro, motion)
@@ -190,10 +195,7 @@ def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
 
     Raises ``InputError`` when they share no motion, or the clock jumps.
     """
-    grid, reference = grid_of(recording), Reference(motion)
-    found = align(grid, reference, _stamped(recording, motion))
-    time = grid.time_s * (1.0 + found.rate) + found.offset_s
-    gyro = start_of(grid, reference, grid.is_valid & reference.covers(time), found)
+    _, _, found, _, gyro = _begun(recording, motion)
     reject_strangers(gyro, motion)
     # With little rotation two logs resemble each other by chance.
     reject_still(motion, gyro.S, gyro.covariance)

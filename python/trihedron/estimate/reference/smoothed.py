@@ -75,12 +75,11 @@ def _slow_error(found: MotionFit, k: int) -> SlowError:
 def without_slow_error(found: MotionFit, k: int) -> Reference:
     """The reference of recording k with its slow error subtracted from its attitudes: gyro and reference together
     determine them better than either, and the remaining tilt error is small."""
-    side, point = found.sides[k], found.points[k]
-    motion = side.reference.motion
+    side, motion = found.sides[k], found.sides[k].reference.motion
     if motion.attitude is None:
         return side.reference
-    time = (motion.time_s - point.offset_s) / (1.0 + point.rate)
-    own = _slow_error(found, k).compensated(time, motion.attitude @ point.mounting) @ point.mounting.T
+    point = replace(found.points[k], slow=_slow_error(found, k))
+    own = side.attitudes(point)[1] @ point.mounting.T
     return Reference(replace(motion, attitude=np.ascontiguousarray(own)))
 
 

@@ -177,9 +177,17 @@ class Windows:
         return out.reshape(len(self.start), *signal.shape[1:])
 
 
-def windows_on(is_valid: BoolArray, step_s: float, spacing: int) -> Windows:
-    """All windows with valid samples only; ``spacing`` samples between neighbours."""
-    m = spacing
+MOST_WINDOWS = 20_000
+"""Most windows; a longer log has longer windows: 0.18 s for an hour, still short for motion by hand."""
+FINEST = 4
+"""Fewest samples between windows: a cubic B-spline over 16 samples has a summation error of 1e-6."""
+
+
+def windows_beside(grid: Grid, reference: Reference, seen: BoolArray, least_s: float = 0.0) -> Windows:
+    """All windows in which both are ``seen`` (n,), at least ``least_s`` apart, and two rows of the reference."""
+    m = max(FINEST, round(least_s / grid.step_s), int(np.ceil(len(grid.time_s) / MOST_WINDOWS)))
+    if not reference.motion.is_stepwise:
+        m = max(m, int(np.ceil(2.0 * reference.step_s / grid.step_s)))
     x = np.arange(-2 * m, 2 * m + 1) / m
     a = np.abs(x)
     h = np.where(a <= 1.0, 2.0 / 3.0 - a**2 + a**3 / 2.0, np.where(a < 2.0, (2.0 - a) ** 3 / 6.0, 0.0))
@@ -189,25 +197,8 @@ def windows_on(is_valid: BoolArray, step_s: float, spacing: int) -> Windows:
     # 1 Hz and 100 samples/s); its second difference corrects this.
     padded = np.pad(curvature, 1)
     curvature = curvature + (padded[2:] - 2.0 * curvature + padded[:-2]) / 12.0
-    spacing_s = m * step_s
-    n = len(is_valid)
-    start = np.arange(0, max(n - 4 * m, 0), m)
-    bad = np.concatenate([[0], np.cumsum(~is_valid)])
+    start = np.arange(0, max(len(seen) - 4 * m, 0), m)
+    bad = np.concatenate([[0], np.cumsum(~seen)])
     start = start[bad[start + 4 * m + 1] == bad[start]]
-    return Windows(
-        m, step_s, h * step_s / spacing_s, slope * step_s / spacing_s**2, curvature * step_s / spacing_s**3, start
-    )
-
-
-MOST_WINDOWS = 20_000
-"""Most windows; a longer log has longer windows: 0.18 s for an hour, still short for motion by hand."""
-FINEST = 4
-"""Fewest samples between windows: a cubic B-spline over 16 samples has a summation error of 1e-6."""
-
-
-def windows_beside(grid: Grid, reference: Reference, seen: BoolArray, least_s: float = 0.0) -> Windows:
-    """Windows where both are ``seen`` (n,), at least ``least_s`` apart, and two rows of the reference."""
-    spacing = max(FINEST, round(least_s / grid.step_s), int(np.ceil(len(grid.time_s) / MOST_WINDOWS)))
-    if not reference.motion.is_stepwise:
-        spacing = max(spacing, int(np.ceil(2.0 * reference.step_s / grid.step_s)))
-    return windows_on(seen, grid.step_s, spacing)
+    # Of unit area: h dt is x from knot to knot.
+    return Windows(m, grid.step_s, h / m, slope / (m**2 * grid.step_s), curvature / (m**3 * grid.step_s**2), start)
