@@ -127,8 +127,7 @@ def from_prior(given):
             x = prior.mean + np.where(prior.may_be_nothing, cauchy, prior.sigma * rng.normal(size=len(free)))
         true = whole(prior, x[free])
         L, _ = stretch.factor(true)
-        seen = stretch.columns @ stretch.centre + L @ rng.normal(size=len(L))
-        draws = fit([replace(stretch, observed=seen)], prior).draws
+        draws = fit([replace(stretch, observed=L @ rng.normal(size=len(L)))], prior).draws
         inside.append([holds(bounded(found), value) for found, value in zip(sizes(draws), sizes(true), strict=True)])
     of_each = zip(("N", "K", "white", "slow", "time constant"), 100.0 * np.mean(inside, axis=0), strict=True)
     print(f"{given.runs} runs, {100.0 * np.mean(inside):.1f} %: " + ", ".join(f"{n} {v:.0f} %" for n, v in of_each))

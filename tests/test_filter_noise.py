@@ -37,7 +37,7 @@ def still(m=60):
     time, eye = np.arange(m) + 0.5, np.eye(3)
     steps = bias_steps(time[:, None, None] * eye)
     return Stretch(
-        time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.zeros(3), np.eye(m), steps,
+        time, np.zeros(3 * m), np.tile(0.1 * eye, (m, 1)), np.eye(m), steps,
         None, np.tile(eye, (m, 1, 1)), np.zeros(m), parts_of_walk(m, is_triangle=False),
     )  # fmt: skip
 

@@ -23,13 +23,8 @@ def too_sure(tilt: TiltCheck | None) -> Iterator[Finding]:
     """A finding where tilt errors after moves exceed what static N predicts by more than a filter tolerates."""
     if tilt is None or tilt.n < FEWEST_MOVES or not tilt.predicted > 0.0 or tilt.actual <= UNCERTAIN * tilt.predicted:
         return
-    yield Finding.of(
-        "filter-noise-inconsistent",
-        "tilt",
-        actual_rad=tilt.actual,
-        times=tilt.actual / tilt.predicted,
-        n=tilt.n,
-    )
+    times = tilt.actual / tilt.predicted
+    yield Finding.of("filter-noise-inconsistent", "tilt", actual_rad=tilt.actual, times=times, n=tilt.n)
 
 
 def unlike_this_log(
@@ -64,24 +59,16 @@ def noticed(one: SensorFilterNoise) -> Iterator[Finding]:
     if N.is_limit and not has_static and N.upper <= one.quietest:
         yield Finding.of("filter-noise-below-quietest", sensor=sensor, quietest=one.quietest)
     elif N.is_limit:
-        yield Finding.of("filter-noise-uncertain", "limit", sensor=sensor, upper=N.upper, has_static=has_static)
+        yield Finding.of("filter-noise-uncertain", "limit", upper=N.upper, sensor=sensor, has_static=has_static)
     elif N.upper > N.lower * UNCERTAIN:
+        low, high = N.lower, N.upper
         yield Finding.of(
-            "filter-noise-uncertain",
-            sensor=sensor,
-            in_file=N.value,
-            lower=N.lower,
-            upper=N.upper,
-            has_static=has_static,
+            "filter-noise-uncertain", sensor=sensor, in_file=N.value, lower=low, upper=high, has_static=has_static
         )
     elif (mostly := _mostly_reference(one)) is not None:
+        share, at_s = mostly
         yield Finding.of(
-            "filter-noise-uncertain",
-            "reference",
-            sensor=sensor,
-            share=mostly[0],
-            horizon_s=mostly[1],
-            has_static=has_static,
+            "filter-noise-uncertain", "reference", sensor=sensor, share=share, horizon_s=at_s, has_static=has_static
         )
     if not has_static:
         yield Finding.of("filter-noise-no-static", sensor=sensor)

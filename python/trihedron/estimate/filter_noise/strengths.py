@@ -120,9 +120,8 @@ def _slope(stretches: Sequence[Stretch], prior: Prior, x: FloatArray) -> tuple[F
     others = [whole(prior, x + STEP * e) for e in np.eye(len(x))]
     for one in stretches:
         V = one.covariance(at)
-        y = one.observed - one.columns @ one.centre
-        inverse = cho_solve(cho_factor(V + one.columns @ one.columns.T, lower=True), np.eye(len(y)))
-        weighed = inverse @ y
+        inverse = cho_solve(cho_factor(V + one.columns @ one.columns.T, lower=True), np.eye(len(V)))
+        weighed = inverse @ one.observed
         carried = []
         for k, other in enumerate(others):
             change = (one.covariance(other) - V) / STEP
@@ -210,18 +209,15 @@ def bounded(values: Sequence[float] | FloatArray) -> Bounded:
 def forgetting(stretches: Sequence[Stretch], walk: Fitted) -> tuple[float, float, float]:
     """Gain in 2 ln evidence, σ [SI] and correlation time [s] of the best Gauss-Markov bias over the random walk, with
     the other strengths fixed."""
-    at = NAMES.index("bias_walk")
-    best = (-np.inf, 0.0, 0.0)
+    at, found = NAMES.index("bias_walk"), []
     for tau in TIMES_S:
         one = [replace(stretch, forgets_s=tau) for stretch in stretches]
-        middle = walk.mode[at] * np.sqrt(0.5 * tau)
-        for size in middle * np.geomspace(1.0 / 30.0, 30.0, 13):
+        for size in walk.mode[at] * np.sqrt(0.5 * tau) * np.geomspace(1.0 / 30.0, 30.0, 13):
             strengths = walk.mode.copy()
             strengths[at] = size
-            found = sum(stretch.evidence(strengths) for stretch in one)
-            best = max(best, (found, float(size), tau))
-    base = sum(stretch.evidence(walk.mode) for stretch in stretches)
-    return 2.0 * (best[0] - base), best[1], best[2]
+            found.append((float(sum(stretch.evidence(strengths) for stretch in one)), float(size), tau))
+    best, sigma, tau = max(found)
+    return 2.0 * (best - sum(stretch.evidence(walk.mode) for stretch in stretches)), sigma, tau
 
 
 # White noise of X, Y and Z separately, in motion: rotation distributes them differently over the world axes.
@@ -258,11 +254,9 @@ def unlike_axes_beside(stretches: Sequence[Stretch], found: Fitted, N: Bounded) 
     if 2.0 * (low(np.zeros(3)) - here) + float(np.sum(np.log(own / AXES_SIGMA**2))) < PREFERRED:
         return ()
     common = (0.25 * np.log(N.upper / max(N.lower, N.upper / ABSENT))) ** 2
-    each = []
-    for x, variance in zip(best, own, strict=True):
-        value, factor = N.value * float(np.exp(x)), float(np.exp(NORMAL_95 * np.sqrt(variance + common)))
-        each.append(Bounded(value, value / factor, value * factor))
-    return tuple(each)
+    values, factors = N.value * np.exp(best), np.exp(NORMAL_95 * np.sqrt(own + common))
+    ends = zip(values.tolist(), (values / factors).tolist(), (values * factors).tolist(), strict=True)
+    return tuple(Bounded(*one) for one in ends)
 
 
 def _of_axes(stretch: Stretch, strengths: FloatArray) -> FloatArray:

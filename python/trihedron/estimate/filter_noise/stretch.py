@@ -29,9 +29,10 @@ NODES, WEIGHTS = (np.polynomial.legendre.leggauss(3) + np.array([[1.0], [0.0]]))
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Observations ``observed`` (3 m,) at ``time_s`` (m,); ``columns`` (3 m, p) scaled to a prior σ of 1.
+    """Observations ``observed`` (3 m,) at ``time_s`` (m,) less their prior mean; ``columns`` (3 m, p) scaled to a prior
+    σ of 1.
 
-    ``centre`` (p,) is the prior mean; ``white`` (m, m) the covariance, equal on every axis, of a white error of the
+    ``white`` (m, m) is the covariance, equal on every axis, of a white error of the
     reference of strength 1; ``bias_steps`` (3 m, 3 n) the derivative of the observations with respect to the bias in
     each block; ``tilts`` (m, 3, 3) the increment that an attitude error in the world frame adds to an observation and
     to all later ones, None where the observation is the angle itself; ``attitude`` (m, 3, 3) body to world; ``power``
@@ -44,7 +45,6 @@ class Stretch:
     time_s: FloatArray
     observed: FloatArray
     columns: FloatArray
-    centre: FloatArray
     white: AnyFloats
     bias_steps: FloatArray
     tilts: FloatArray | None
@@ -131,7 +131,7 @@ class Stretch:
         try:
             L = cholesky(V, lower=True, check_finite=False)
             half = solve_triangular(L, np.column_stack([self.columns, self.observed]), lower=True, check_finite=False)
-            X, y = half[:, :-1], half[:, -1] - half[:, :-1] @ self.centre
+            X, y = half[:, :-1], half[:, -1]
             inner = cholesky(np.eye(X.shape[1]) + X.T @ X, lower=True, check_finite=False)
         except np.linalg.LinAlgError:
             # The strengths differ so much that V is singular in double precision.
@@ -149,7 +149,7 @@ class Stretch:
         (R,) = qr(np.hstack([self.columns, root]).T, mode="r", overwrite_a=True, check_finite=False)
         n = len(self.observed)
         L = np.asarray(R[:n].T * np.sign(np.diag(R)), dtype=np.float64)
-        return L, solve_triangular(L, self.observed - self.columns @ self.centre, lower=True, check_finite=False)
+        return L, solve_triangular(L, self.observed, lower=True, check_finite=False)
 
     def part(self, first: int, last: int) -> Stretch:
         """The stretch of blocks ``first`` to ``last`` (exclusive)."""

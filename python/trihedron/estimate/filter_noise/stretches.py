@@ -68,7 +68,8 @@ def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[S
     is_good = np.asarray(np.all(side.seen[: m * n].reshape(m, n), axis=1) & (rows[:m] > 0), dtype=bool)
     power, quietest = shaken(side.corrected(point), side, is_good, band_hz, static_N)
     time, attitude = blocks.time_s(), blocks.attitude()
-    angle = problem.observed.reshape(-1, 3) + _within_blocks(blocks, point)
+    expected = problem.columns @ problem.centre
+    angle = (problem.observed - expected).reshape(-1, 3) + _within_blocks(blocks, point)
     columns = problem.columns.reshape(len(rows), 3, -1)
     by_bias = blocks.moments().reshape(len(rows), 3, 3, -1)[..., 3]
     out = []
@@ -78,7 +79,6 @@ def angle_stretches(found: MotionFit, band_hz: float, static_N: float) -> list[S
             time_s=time[at],
             observed=angle[at].ravel(),
             columns=np.hstack([columns[at].reshape(len(start), -1), start]),
-            centre=np.concatenate([problem.centre, np.zeros(3)]),
             white=np.diag(rows.max() / rows[at]),
             bias_steps=bias_steps(by_bias[at]),
             tilts=None,
@@ -171,7 +171,6 @@ def _velocity_stretch(
         time_s=time.reshape(-1, n).mean(axis=1)[:-1] + 0.5 * h,
         observed=observed.ravel(),
         columns=columns,
-        centre=np.zeros(columns.shape[1]),
         white=(2.0 * np.eye(m) - np.eye(m, k=1) - np.eye(m, k=-1)) / h**2,
         bias_steps=bias_steps(bias),
         # An attitude error e changes the specific force f by e x f; its integral is a velocity error.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron._core import rolling_mean
-from trihedron.arrays import TINY, FloatArray, IntArray
+from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.errors import InputError
 from trihedron.estimate.reference.together import Grid, Reference
 
@@ -44,7 +44,7 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     ``stamped_offset_s`` is the offset by the absolute timestamps of both logs, where they have any. Raises
     ``InputError`` when the motions differ at every lag, or the reference's clock jumps.
     """
-    ours = _size_of_rate(grid)
+    ours = _size(grid.gyroscope - np.median(grid.gyroscope[grid.is_valid], axis=0), grid.is_valid)
     first_s, last_s = reference.motion.time_s[[0, -1]].tolist()
     theirs = _reference_size(reference, np.arange(first_s, last_s, grid.step_s), grid.step_s)
     offset, correlation = _best_lag(ours, theirs, grid.step_s, stamped_offset_s)
@@ -60,21 +60,16 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     return Alignment(*refined, correlation)
 
 
-def _size_of_rate(grid: Grid) -> FloatArray:
-    """(n,) magnitude of the raw rate about its median per axis; NaN within gaps."""
-    raw = grid.gyroscope - np.median(grid.gyroscope[grid.is_valid], axis=0)
-    size = np.linalg.norm(raw, axis=1)
-    size[~grid.is_valid] = np.nan
-    return np.asarray(size, dtype=np.float64)
+def _size(rate: FloatArray, is_there: BoolArray) -> FloatArray:
+    """(n,) magnitude of rates (n, 3); NaN where there is none."""
+    return np.where(is_there, np.linalg.norm(rate, axis=1), np.nan)
 
 
 def _reference_size(reference: Reference, t: FloatArray, step: float) -> FloatArray:
     """(n,) magnitude of the reference's rate at times (n,) ``step`` apart; NaN where it has no rows."""
     # The differentiated noise of a tracker exceeds the motion unless it is averaged.
     rate = rolling_mean(reference.rate(t), max(1, round(0.1 / step)))
-    size = np.linalg.norm(rate, axis=1)
-    size[~reference.covers(t)] = np.nan
-    return np.asarray(size, dtype=np.float64)
+    return _size(rate, reference.covers(t))
 
 
 def _best_lag(a: FloatArray, b: FloatArray, step: float, stamped: float | None) -> tuple[float, float]:
