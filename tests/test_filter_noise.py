@@ -342,9 +342,9 @@ def test_tilt_errors_far_above_their_prediction_make_static_values_untrustworthy
 def test_a_parameter_error_that_noise_explains_has_an_upper_limit_and_no_share():
     """Squares of estimates of nothing add up to more than nothing; an error of five sigma is seen."""
     rng, sigma, step = np.random.default_rng(6), 0.01, np.eye(9)[None]
-    cov = sigma**2 * np.eye(9)
+    known = np.eye(9) / sigma**2
     limits = [
-        bounded(mean_square(step, drawn_errors(size * sigma + sigma * rng.normal(size=9), cov, PARTS))).is_limit
+        bounded(mean_square(step, drawn_errors(known, (size + rng.normal(size=9)) / sigma, PARTS))).is_limit
         for size in [0.0] * 20 + [5.0] * 5
     ]
     assert sum(limits[:20]) >= 19

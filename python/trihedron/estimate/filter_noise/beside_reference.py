@@ -174,7 +174,7 @@ def informed(usual: Prior, stretches: Sequence[Stretch], static: StaticNoise | N
     # Without a static N only a change of power separates vibration from noise.
     shows = np.any(power > 0.0) and (static is not None or np.std(power) > 0.2 * np.mean(power))
     is_there[1] = float(shows)
-    is_there[7] = float(any(one.kelvin is not None for one in stretches))
+    is_there[7] = float(stretches[0].kelvin is not None)
     return replace(usual, mean=mean, sigma=sigma, is_there=is_there)
 
 

@@ -23,7 +23,7 @@ G_SENSITIVITY = "gyro-g-sensitivity"
 PARTS = np.append(0.0, np.geomspace(1e-2, 10.0, 33))
 """Sizes tried for the g-sensitivity, in units of the data sheets' typical value."""
 FLAT = 1e-2
-"""Fraction of the prior's information that stays when a prior is removed, so that the covariance is invertible."""
+"""Fraction of the prior's information that stays when a prior is removed, so that none is negative."""
 
 
 def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
@@ -47,8 +47,8 @@ def left_over(found: MotionFit, horizons_s: Sequence[float]) -> Left:
     # A rotation of the mounting times a symmetric matrix, of six elements.
     every = np.eye(9).reshape(9, 3, 3)
     kept = np.linalg.svd((u @ vt @ (every + every.swapaxes(1, 2))).reshape(9, 9))[2][:6]
-    seen, cov = kept @ (S - scale * u @ vt).ravel(), kept @ found.covariance(0, ("S",)) @ kept.T
-    elements = drawn_errors(seen, cov, SIZES) @ kept
+    known = np.asarray(np.linalg.inv(kept @ found.covariance(0, ("S",)) @ kept.T), dtype=np.float64)
+    elements = drawn_errors(known, known @ kept @ (S - scale * u @ vt).ravel(), SIZES) @ kept
     by: dict[Cause, tuple[FloatArray, FloatArray]] = {"calibration": (carried(grid.gyroscope), elements)}
     if side.force is not None and G_SENSITIVITY in found.places[0]:
         by["g-sensitivity"] = (carried(side.force), _g_sensitivities(found))
@@ -63,9 +63,8 @@ def _g_sensitivities(found: MotionFit) -> FloatArray:
     """(k, 9) draws of the g-sensitivity: its likelihood without the fit's prior, with one size for all elements."""
     name = G_SENSITIVITY
     size = float(np.mean(found.sides[0].sigma(name, found.wider)))
-    inverse = np.linalg.inv(found.covariance(0, (name,)))
-    cov = np.asarray(np.linalg.inv(inverse - (1.0 - FLAT) * np.eye(len(inverse)) / size**2), float)
-    return drawn_errors(cov @ inverse @ found.value(0, name), cov, size * PARTS)
+    known = np.asarray(np.linalg.inv(found.covariance(0, (name,))), dtype=np.float64)
+    return drawn_errors(known - (1.0 - FLAT) * np.eye(len(known)) / size**2, known @ found.value(0, name), size * PARTS)
 
 
 def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:
@@ -74,22 +73,25 @@ def mean_square(steps: FloatArray, errors: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ki,ij,kj->k", errors, square, errors))
 
 
-def drawn_errors(seen: FloatArray, cov: FloatArray, sizes: FloatArray) -> FloatArray:
-    """(k, f) posterior draws of errors with estimate ``seen`` (f,), covariance (f, f) and one prior σ among ``sizes``.
+def drawn_errors(information: FloatArray, moment: FloatArray, sizes: FloatArray) -> FloatArray:
+    """(k, f) posterior draws of errors under the information (f, f) and moment (f,) of their likelihood and one prior σ
+    among ``sizes``.
 
     Without the prior the variance of the estimate would count twice: noise makes a perfect matrix seem imperfect.
     """
-    width = [cov + size**2 * np.eye(len(seen)) for size in sizes]
-    log_p = np.array([-0.5 * (np.linalg.slogdet(V)[1] + seen @ np.linalg.solve(V, seen)) for V in width])
-    weight = np.exp(log_p - log_p.max())
-    rng = np.random.default_rng(0)
-    out = []
-    for k in rng.choice(len(sizes), DRAWN, p=weight / weight.sum()):
-        gain = sizes[k] ** 2 * np.linalg.inv(width[k])
-        left = sizes[k] ** 2 * (np.eye(len(seen)) - gain)
-        values, vectors = np.linalg.eigh(0.5 * (left + left.T))
-        out.append(gain @ seen + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=len(seen))))
-    return np.array(out)
+    width = [np.eye(len(moment)) + size**2 * information for size in sizes]
+    gain = np.array([size**2 * moment @ np.linalg.solve(V, moment) for size, V in zip(sizes, width, strict=True)])
+    log_p = 0.5 * (gain - np.linalg.slogdet(width)[1])
+    weight, rng = np.exp(log_p - log_p.max()), np.random.default_rng(0)
+    chosen = rng.choice(sizes, DRAWN, p=weight / weight.sum())
+    return np.array([_drawn_under(size, information, moment, rng) for size in chosen])
+
+
+def _drawn_under(size: float, information: FloatArray, moment: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """(f,) a draw of coefficients under the information and moment of their likelihood and a prior σ."""
+    cov = size**2 * np.linalg.inv(np.eye(len(moment)) + size**2 * information)
+    values, vectors = np.linalg.eigh(0.5 * (cov + cov.T))
+    return np.asarray(cov @ moment + vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.normal(size=len(moment))))
 
 
 # Bias proportional to a logged temperature: its effect on a stretch, and its share of the error.
@@ -107,13 +109,10 @@ def beside_temperature(stretches: Sequence[Stretch], recording: Recording) -> li
     degrees = recording.temperature_degc
     if degrees is None or np.count_nonzero(is_there := np.isfinite(degrees)) < 2:
         return list(stretches)
+    time, value = recording.time_s[is_there], degrees[is_there]
     # Block means reduce the thermometer's noise and resolution.
-    means = [
-        np.interp(one.time_s[:, None] + one.step_s * OF_BLOCK, recording.time_s[is_there], degrees[is_there]).mean(
-            axis=1
-        )
-        for one in stretches
-    ]
+    within = [one.time_s[:, None] + one.step_s * OF_BLOCK for one in stretches]
+    means = [np.interp(at, time, value).mean(axis=1) for at in within]
     every = np.concatenate(means)
     if np.ptp(every) < LEAST_SWING_K:
         return list(stretches)
@@ -123,17 +122,14 @@ def beside_temperature(stretches: Sequence[Stretch], recording: Recording) -> li
 def of_temperature(stretches: Sequence[Stretch], found: Fitted, horizons_s: Sequence[float]) -> Left:
     """Mean square errors, over all starts of every horizon, from the change of bias with temperature since the start;
     empty where no temperature was logged."""
-    told = [one for one in stretches if one.kelvin is not None]
-    if not told:
+    if stretches[0].kelvin is None:
         return {}
-    errors = _drawn(told, found)
-    return {
-        h: {"temperature": mean_square(np.concatenate([_since_start(one, h) for one in told]), errors)}
-        for h in horizons_s
-    }
+    errors = _drawn(stretches, found)
+    of_all = {h: np.concatenate([_since_start(one, h) for one in stretches]) for h in horizons_s}
+    return {h: {"temperature": mean_square(steps, errors)} for h, steps in of_all.items()}
 
 
-def _drawn(told: Sequence[Stretch], found: Fitted) -> FloatArray:
+def _drawn(stretches: Sequence[Stretch], found: Fitted) -> FloatArray:
     """(k, 3) bias per kelvin [SI/K], one for each draw of the strengths.
 
     A slow bias change is due to temperature or to the random walk: each coefficient is drawn under a K near its draw's.
@@ -146,15 +142,14 @@ def _drawn(told: Sequence[Stretch], found: Fitted) -> FloatArray:
         others = np.where(np.isin(NAMES, "per_kelvin"), 0.0, found.draws[some[len(some) // 2]])
         information, moment = np.zeros((3, 3)), np.zeros(3)
         # All stretches are of one sensor.
-        for one in told:
+        for one in stretches:
             assert one.warmth is not None
             L, w = one.factor(others)
             half = solve_triangular(L, one.warmth, lower=True, check_finite=False)
             information += half.T @ half
             moment += half.T @ w
         for k in some:
-            cov = np.linalg.inv(information + np.eye(3) / size[k] ** 2)
-            errors[k] = cov @ moment + np.linalg.cholesky(cov) @ rng.normal(size=3)
+            errors[k] = _drawn_under(size[k], information, moment, rng)
     return errors
 
 
