@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky, qr, solve_triangular
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.filter_noise import Nees
-
-AnyFloats = np.ndarray[Any, np.dtype[Any]]
 
 NAMES = ("noise", "vibration", "bias_walk", "white", "world", "body", "slow_s", "per_kelvin")
 """Order of the eight strengths of a stretch."""
@@ -32,20 +29,20 @@ class Stretch:
     """Observations ``observed`` (3 m,) at ``time_s`` (m,) less their prior mean; ``columns`` (3 m, p) scaled to a prior
     σ of 1.
 
-    ``white`` (m, m) is the covariance, equal on every axis, of a white error of the
-    reference of strength 1; ``bias_steps`` (3 m, 3 n) the derivative of the observations with respect to the bias in
-    each block; ``tilts`` (m, 3, 3) the increment that an attitude error in the world frame adds to an observation and
-    to all later ones, None where the observation is the angle itself; ``attitude`` (m, 3, 3) body to world; ``power``
-    (n,) that of vibration in each block, with mean 1; ``walk`` (m, 3 n) as `parts_of_walk`; ``white_rad`` a known white
-    error of the attitude in each block; ``kelvin`` (n,) the logged temperature less its mean, or None; ``quietest``
-    [SI/√Hz] the noise density of the log's quietest block, above the band: static noise and vibration; ``forgets_s``
-    the correlation time of a Gauss-Markov bias, whose strength is its stationary σ [SI], 0 for a random walk.
+    ``white`` (m, m) is the covariance, equal on every axis, of the reference's white error for strength 1;
+    ``bias_steps`` (3 m, 3 n) the derivative of the observations with respect to the bias in each block; ``tilts``
+    (m, 3, 3) the increment that an attitude error in the world frame adds to an observation and to all later ones, None
+    where the observation is the angle itself; ``attitude`` (m, 3, 3) body to world; ``power`` (n,) that of vibration in
+    each block, with mean 1; ``walk`` (m, 3 n) as `parts_of_walk`; ``white_rad`` a known white error of the attitude in
+    each block; ``kelvin`` (n,) the logged temperature less its mean, or None; ``quietest`` [SI/√Hz] the noise density
+    of the log's quietest block, above the band: static noise and vibration; ``forgets_s`` the correlation time of a
+    Gauss-Markov bias, whose strength is its stationary σ [SI], 0 for a random walk.
     """
 
     time_s: FloatArray
     observed: FloatArray
     columns: FloatArray
-    white: AnyFloats
+    white: FloatArray
     bias_steps: FloatArray
     tilts: FloatArray | None
     attitude: FloatArray
@@ -62,17 +59,14 @@ class Stretch:
         return float(np.median(np.diff(self.time_s)))
 
     @cached_property
-    def alike(self) -> tuple[AnyFloats, ...]:
+    def alike(self) -> tuple[FloatArray, ...]:
         """(m, m) covariances, equal on every axis, of noise, vibration and white error of strength 1."""
-        noise, vibration = (self.accumulated(each) for each in (np.ones(len(self.power)), self.power))
+        densities = [np.outer(self.step_s * each, WEIGHTS).ravel() for each in (np.ones(len(self.power)), self.power)]
+        noise, vibration = (self.walk * density @ self.walk.T for density in densities)
         return noise, vibration, self.white
 
-    def accumulated(self, density: FloatArray) -> FloatArray:
-        """(m, m) covariance of observations of a random walk with a variance ``density`` (n,) per second in a block."""
-        return np.asarray((self.walk * np.outer(self.step_s * density, WEIGHTS).ravel()) @ self.walk.T)
-
     @cached_property
-    def bias_walk(self) -> AnyFloats:
+    def bias_walk(self) -> FloatArray:
         """(3 m, 3 m) covariance by the bias of strength 1."""
         n = self.bias_steps.shape[1] // 3
         at = self.step_s * np.arange(1, n + 1)
@@ -94,7 +88,7 @@ class Stretch:
         return world @ world.T, body @ body.T
 
     @cached_property
-    def given(self) -> AnyFloats | float:
+    def given(self) -> FloatArray | float:
         """(3 m, 3 m) covariance of a velocity by the known white attitude error: white acceleration, |f| times it."""
         if self.tilts is None:
             return 0.0
@@ -110,11 +104,10 @@ class Stretch:
         lag_s = np.subtract.outer(self.time_s, self.time_s)
         out = s["bias_walk"] ** 2 * self.bias_walk
         parted = out.reshape(m, 3, m, 3)
-        if s["world"] > 0.0 or s["body"] > 0.0:
-            world, body = self.tilted
-            slow = matern_of_means(lag_s, float(s["slow_s"]), width_s).repeat(3, axis=0).repeat(3, axis=1)
-            slow = (slow * (s["world"] ** 2 * world + s["body"] ** 2 * body)).reshape(parted.shape)
-            parted += slow if self.tilts is None else np.cumsum(np.cumsum(slow, axis=0), axis=2)
+        world, body = self.tilted
+        slow = matern_of_means(lag_s, float(s["slow_s"]), width_s).repeat(3, axis=0).repeat(3, axis=1)
+        slow = (slow * (s["world"] ** 2 * world + s["body"] ** 2 * body)).reshape(parted.shape)
+        parted += slow if self.tilts is None else np.cumsum(np.cumsum(slow, axis=0), axis=2)
         same = sum(s[name] ** 2 * basis for name, basis in zip(ALIKE, self.alike, strict=True))
         for axis in range(3):
             parted[:, axis, :, axis] += same

@@ -53,8 +53,8 @@ def start_of(grid: Grid, reference: Reference, seen: BoolArray, clock: Alignment
     linear = np.concatenate([of_S, np.tile(np.eye(3), (len(raw), 1, 1))], axis=2)
     for _ in range(TURNS if has_clock else 1):
         rates = reference.rate(grid.time_s * (1.0 + rate) + offset_s)
-        target, slope = windows.of(windows.weight, rates), -windows.of(windows.slope, rates)
-        by_clock = np.stack([-slope, -slope * since], axis=2) if has_clock else np.zeros((len(raw), 3, 0))
+        target, change = windows.of(windows.weight, rates), windows.of(windows.slope, rates)
+        by_clock = np.stack([change, change * since], axis=2) if has_clock else np.zeros((len(raw), 3, 0))
         found = solve(np.concatenate([linear, by_clock], axis=2), target, windows.start // windows.spacing)
         moved, rate_change = found.theta[12:] if has_clock else (0.0, 0.0)
         offset_s += float(moved - rate_change * middle)
