@@ -38,7 +38,8 @@ MANY, PLAIN = 0.15, 0.25
 FEWEST_TIMESTAMPS = 100
 """Smallest number of distinct timestamps for a period."""
 WHOLE = 0.005
-"""A packet contains a whole number of samples if rows per packet differ from one by less than this fraction."""
+"""A packet contains a whole number of samples if rows per packet differ from one by less than this fraction; packets
+that were lost have no rows, and none of these is missing in another."""
 POLLED = 0.55
 """Lowest frequency of a beat; slower ones may be packets of two or more samples, with the period at a multiple."""
 REGULAR = 0.12
@@ -75,8 +76,10 @@ def find_period(time_s: FloatArray) -> Period:
     spectrum = _Spectrum(power, mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
     grid = _grid_of_steps(time_s[:MOST_STEPS]) or (mean_step / line if line else 0.0)
-    best = _choose(spectrum, line)
-    if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_TIMESTAMPS:
+    ends = [np.flatnonzero(np.diff(w) > 0.2 * mean_step) for w in windows]
+    n_packets = sum(max(len(e) - 1, 0) for e in ends)
+    best = _choose(spectrum, line, sum(int(e[-1] - e[0]) for e in ends if len(e)) / max(n_packets, 1))
+    if best is None or n_packets + len(ends) < FEWEST_TIMESTAMPS:
         return Period(mean_step, 0.0, grid, False)
     k = int(np.argmin(np.abs(spectrum.per_step - best)))
     reach = spectrum.lobe
@@ -189,8 +192,9 @@ def _poll(spectrum: _Spectrum) -> float:
     return _summit(spectrum.power, k) * spectrum.width
 
 
-def _choose(spectrum: _Spectrum, line: float) -> float | None:
-    """The period's frequency per mean distance of rows, or ``None`` where none is significant."""
+def _choose(spectrum: _Spectrum, line: float, rows: float) -> float | None:
+    """The period's frequency per mean distance of rows, or ``None`` where none is significant; ``rows`` with one
+    timestamp, on average."""
     peaks = spectrum.peaks()
     power, per_step = spectrum.power[peaks], spectrum.per_step[peaks]
     near = 2 * spectrum.lobe * spectrum.width
@@ -212,15 +216,15 @@ def _choose(spectrum: _Spectrum, line: float) -> float | None:
         chosen = float(strong[np.argmin(_cost(strong))])
     if not line or line > HIGHEST:
         return chosen
-    of_line = line * max(round(1.0 / line), 1)
+    whole = max(round(rows), 1)
     if line < SLOWER:
         # Packets with a whole number of samples; else a coarse grid, on which the period is a weaker peak or none.
-        is_packet = not poll and _cost(np.array([of_line]))[0] < WHOLE
-        return of_line if is_packet else chosen
+        is_packet = not poll and abs(rows - whole) < WHOLE * whole
+        return whole * line if is_packet else chosen
     # An exact log has only its own line; on a grid close to the period, the period has fewer lost samples. A log with
     # every tenth sample lost looks like one with a grid of nine tenths of the period: a loss is more common.
-    loses_fewer = chosen is not None and _cost(np.array([of_line]))[0] > max(_cost(np.array([chosen]))[0], REGULAR)
-    return chosen if loses_fewer else of_line
+    loses_fewer = chosen is not None and _cost(np.array([line]))[0] > max(_cost(np.array([chosen]))[0], REGULAR)
+    return chosen if loses_fewer else line
 
 
 def _cost(per_step: FloatArray) -> FloatArray:
