@@ -19,10 +19,7 @@ def numbers(seed, lost):
     """(N,) sample numbers with ``lost`` single samples missing, and the rows behind which they are."""
     rng = np.random.default_rng(seed)
     behind = np.sort(rng.choice(np.arange(50, N - 50, 40), lost, replace=False))
-    step = np.ones(N, dtype=np.int64)
-    step[0] = 0
-    step[behind + 1] += 1
-    return np.cumsum(step), behind
+    return np.arange(N) + np.searchsorted(behind, np.arange(N)), behind
 
 
 def arrival(tick, law, seed):
@@ -96,11 +93,14 @@ def test_without_motion_stamps_stay_and_the_doubt_is_said(tmp_path):
     assert "time-gap" not in codes(recording)
 
 
-def test_packets_with_one_stamp_are_spread_even_at_rest(tmp_path):
-    timestamps = np.repeat(T * np.arange(4, N, 5), 5)
-    recording = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, motion(np.zeros(N))]), HEADER))
+@pytest.mark.parametrize(("lost", "rows", "off"), [(0.0, 5, 1e-3), (0.03, 5, 10), (0.03, 1, 20)])
+def test_packets_with_one_stamp_are_spread_even_at_rest(tmp_path, lost, rows, off):
+    tick = np.flatnonzero(np.repeat(np.random.default_rng(1).random(N // rows) >= lost, rows))
+    table = np.column_stack([T * (tick // 5 * 5 + 4), motion(np.zeros(len(tick)))])
+    recording = read_recording(write(tmp_path / "a.csv", table, HEADER))
     assert recording.sampling.is_even
-    np.testing.assert_allclose(np.diff(recording.time_s), T, rtol=1e-4)
+    np.testing.assert_allclose(recording.time_s / T, tick - tick[0], atol=off)
+    assert recording.rate_hz == pytest.approx(1 / T, rel=1e-4 + (rows == 1) * lost)
 
 
 @pytest.mark.parametrize("is_before", [True, False])

@@ -10,7 +10,8 @@ from trihedron import _core
 from trihedron.arrays import TINY, FloatArray, IntArray
 from trihedron.quantiles import MAD_TO_SIGMA, median, quantiles
 from trihedron.read.clock.losses import ahead, block_rows, lateness, track
-from trihedron.read.clock.period import STALL_STEPS, find_period
+from trihedron.read.clock.period import FEWEST_TIMESTAMPS, STALL_STEPS, find_period
+from trihedron.read.clock.rate import mean_rate_hz, steps_of
 from trihedron.records.sampling import TimestampKind
 
 FEWEST_ROWS = 100
@@ -19,6 +20,8 @@ UNSEEN = 0.02
 """Deviation from an even clock, in periods, below which neither its growth nor a drift of the rate is tested."""
 EXACT = 0.005
 """Rms deviation from an even clock, in periods, below which timestamps are exact."""
+SHARED = 0.005
+"""Share of samples with the previous sample's timestamp above which timestamps cannot be the instants of sampling."""
 GROWTH = 4.0
 """Ratio of the variances of elapsed-time errors over 16 m and over m rows, above which there is no even clock: 16 for
 independent steps, 1 for an even clock."""
@@ -81,7 +84,14 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     error = _error(time_s, even)
     growth = _growth(error, pauses, unseen)
     if moved_back > TAKEN_BACK or growth > GROWTH or (not is_seen and growth > 0.5 * GROWTH):
-        return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
+        steps = steps_of(time_s)
+        if steps.same <= SHARED * (n - 1) or steps.forward < FEWEST_TIMESTAMPS:
+            return EvenClock(TimestampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False)
+        # Samples of packets were lost, and nothing shows how many.
+        is_seen, period = False, 1.0 / mean_rate_hz(time_s)
+        tick, pauses, _ = track(time_s, period, width, is_seen, room)
+        even, mean_period, sigma = _lay(time_s, tick, period, pauses, (width, unseen), False, room)
+        error = _error(time_s, even)
     kind = _kind(error, period, found.grid_s)
     if kind is not TimestampKind.LATE:
         # For two-sided errors the clock is at their middle, not at their edge.

@@ -76,9 +76,12 @@ def find_period(time_s: FloatArray) -> Period:
     spectrum = _Spectrum(power, mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
     grid = _grid_of_steps(time_s[:MOST_STEPS]) or (mean_step / line if line else 0.0)
-    ends = [np.flatnonzero(np.diff(w) > 0.2 * mean_step) for w in windows]
-    n_packets = sum(max(len(e) - 1, 0) for e in ends)
-    best = _choose(spectrum, line, sum(int(e[-1] - e[0]) for e in ends if len(e)) / max(n_packets, 1))
+    steps = [np.diff(w) for w in windows]
+    ends = [np.flatnonzero(step > 0.2 * mean_step) for step in steps]
+    n_packets = sum(max(len(end) - 1, 0) for end in ends)
+    rows = sum(int(end[-1] - end[0]) for end in ends if len(end)) / max(n_packets, 1)
+    apart = float(np.median(np.concatenate([step[end] for step, end in zip(steps, ends, strict=True)])))
+    best = _choose(spectrum, line, rows, apart / mean_step)
     if best is None or n_packets + len(ends) < FEWEST_TIMESTAMPS:
         return Period(mean_step, 0.0, grid, False)
     k = int(np.argmin(np.abs(spectrum.per_step - best)))
@@ -192,9 +195,9 @@ def _poll(spectrum: _Spectrum) -> float:
     return _summit(spectrum.power, k) * spectrum.width
 
 
-def _choose(spectrum: _Spectrum, line: float, rows: float) -> float | None:
-    """The period's frequency per mean distance of rows, or ``None`` where none is significant; ``rows`` with one
-    timestamp, on average."""
+def _choose(spectrum: _Spectrum, line: float, rows: float, apart: float) -> float | None:
+    """The period's frequency per mean distance of rows, or ``None`` where none is significant; ``rows`` of a packet, on
+    average, and how far most packets are ``apart``, in mean distances."""
     peaks = spectrum.peaks()
     power, per_step = spectrum.power[peaks], spectrum.per_step[peaks]
     near = 2 * spectrum.lobe * spectrum.width
@@ -220,7 +223,7 @@ def _choose(spectrum: _Spectrum, line: float, rows: float) -> float | None:
     if line < SLOWER:
         # Packets with a whole number of samples; else a coarse grid, on which the period is a weaker peak or none.
         is_packet = not poll and abs(rows - whole) < WHOLE * whole
-        return whole * line if is_packet else chosen
+        return whole * line / max(round(apart * line), 1) if is_packet else chosen
     # An exact log has only its own line; on a grid close to the period, the period has fewer lost samples. A log with
     # every tenth sample lost looks like one with a grid of nine tenths of the period: a loss is more common.
     loses_fewer = chosen is not None and _cost(np.array([line]))[0] > max(_cost(np.array([chosen]))[0], REGULAR)

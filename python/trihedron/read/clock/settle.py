@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import TINY, FloatArray, IntArray
-from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
+from trihedron.read.clock.even import EXACT, SHARED, EvenClock, find_even_clock
 from trihedron.read.clock.rate import steps_of, steps_of_counter
 from trihedron.records import Finding
 from trihedron.records.sampling import Sampling, TimestampKind
@@ -108,8 +108,6 @@ def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArr
 WORTH = 0.03
 """Rms deviation from an even clock, in steps, below which timestamps need no correction (those rounded to a tenth of a
 step are below it): the error of a rotation integrated over them is less than 1/30 of one sample's contribution."""
-SHARED = 0.005
-"""Share of samples with the previous sample's timestamp above which timestamps cannot be the instants of sampling."""
 STANDARD_ERRORS, SYSTEMATIC = 4.0, 0.15
 """A share of 0 or 1 is rejected beyond four standard errors plus the bias that a filter or curved motion may cause."""
 VAGUE = 0.2
