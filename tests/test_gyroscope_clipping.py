@@ -159,8 +159,7 @@ def test_known_turns_of_a_coarse_gyro_lie_within_their_error_bars(step, is_table
                 turns.append((at - 5, at + len(shape) + 5, axis, sense * np.pi))
                 at += len(shape) + len(rates[-1])
         rates = np.concatenate(rates)
-        seen = rates @ mix.T + zero + 0.05 * rng.normal(size=rates.shape)
-        seen = step * np.round(seen / step)
+        seen = step * np.round((rates @ mix.T + zero + 0.05 * rng.normal(size=rates.shape)) / step)
         edges = [0, *(x for turn in turns for x in turn[:2]), len(rates)]
         zeros = list(zip(edges[::2], edges[1::2], strict=True))
         recording = Recording(np.arange(len(seen)) / RATE_HZ, None, seen, RATE_HZ, "counts", "deg/s")
@@ -187,10 +186,8 @@ def test_faces_of_a_coarse_accelerometer_lie_within_their_error_bars(logs):
         S_a = np.diag([13.0, 13.1, 12.9]) @ (np.eye(3) + 0.01 * rng.normal(size=(3, 3)))
         zero = rng.normal(size=3) * 5.0
         f = 9.81 * np.sign(faces)[:, None] * np.eye(3)[np.abs(faces) - 1]
-        for k in range(0, 18, 3):
-            across = np.eye(3)[np.abs(faces[k]) - 1] == 0.0
-            lean = rng.normal(size=(2, 3)) * 0.2 * across
-            f[k : k + 3] += lean[[0, 1, 0]]
+        lean = 0.2 * rng.normal(size=(6, 2, 3)) * (f[::3, None] == 0.0)
+        f += lean[:, [0, 1, 0]].reshape(18, 3)
         places = f @ S_a.T + zero
         values = np.array([np.round(p + 0.1 * rng.normal(size=(400, 3))).mean(axis=0) for p in places])
         found, _ = calibrate_faces(values, np.full(3, np.sqrt(part)), 9.81, up=faces.tolist(), shared=np.full(3, part))
@@ -209,6 +206,13 @@ def test_a_gyro_that_clipped_in_most_moves_is_left_out_for_that_reason():
     clipped = replace(log, gyroscope=counts, gyroscope_unit=RateUnit.COUNTS)
     left_out = [f for f in calibrate(clipped, gravity_m_s2=G).findings if f.code == "gyroscope-left-out"]
     assert left_out[0].numbers["n_lost"] > 0.5 * left_out[0].numbers["n_moves"]
+
+
+def test_a_right_calibration_is_verified_by_moves_whose_peaks_are_bridged():
+    right = calibrate(recorded(Instrument(), 3), gravity_m_s2=G)
+    log = recorded(Instrument(), 4, move_s=0.3, rate_hz=100.0)
+    limit = 0.6 * np.abs(log.gyroscope).max()
+    assert trihedron.verify(right, replace(log, gyroscope=np.clip(log.gyroscope, -limit, limit))).is_passed
 
 
 def test_a_range_limit_met_in_every_move_is_the_physics_that_is_missing():

@@ -57,8 +57,7 @@ def test_the_period_is_right_and_losses_are_counted_where_they_are(law, lost, se
 
 @pytest.mark.parametrize("scatter", [0.05, 0.2, 0.5])
 def test_steps_drawn_anew_have_no_even_clock(scatter):
-    rng = np.random.default_rng(3)
-    t = np.cumsum(T * rng.gamma(scatter**-2, scatter**2, N))
+    t = np.cumsum(T * np.random.default_rng(3).gamma(scatter**-2, scatter**2, N))
     assert find_even_clock(t - t[0]).kind is TimestampKind.IRREGULAR
 
 
@@ -85,9 +84,8 @@ def test_motion_shows_whether_samples_were_taken_evenly_or_when_stamped(tmp_path
 
 
 def test_without_motion_stamps_stay_and_the_doubt_is_said(tmp_path):
-    timestamps = arrival(np.arange(N), "scattered", 4)
-    still = motion(np.zeros(N))
-    recording = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, still]), HEADER))
+    table = np.column_stack([arrival(np.arange(N), "scattered", 4), motion(np.zeros(N))])
+    recording = read_recording(write(tmp_path / "a.csv", table, HEADER))
     assert not recording.sampling.is_even
     assert "no motion shows" in finding(recording, "clock-undecided").seen
     assert "time-gap" not in codes(recording)
@@ -107,16 +105,14 @@ def test_packets_with_one_stamp_are_spread_even_at_rest(tmp_path, lost, rows, of
 def test_timestamps_that_a_batch_shares_are_spread_over_the_longer_steps(is_before):
     # Batches of five and single samples in turn: a batch fills the 50 ms before its timestamp, or behind it.
     size = np.tile([5, 1] if is_before else [1, 5], 20)
-    step = np.tile([0.05, 0.01], 20)
-    spread = spread_timestamps(np.repeat(np.cumsum(step), size), 0.01)
+    spread = spread_timestamps(np.repeat(np.cumsum(np.tile([0.05, 0.01], 20)), size), 0.01)
     assert spread[0] == 0.0
     np.testing.assert_allclose(np.diff(spread), 0.01, atol=1e-9)
 
 
 def test_a_counter_settles_what_late_stamps_leave_open(tmp_path):
     tick, behind = numbers(1, 30)
-    rng = np.random.default_rng(1)
-    timestamps = np.maximum.accumulate(T * tick + rng.exponential(3.0 * T, N))
+    timestamps = np.maximum.accumulate(T * tick + np.random.default_rng(1).exponential(3.0 * T, N))
     table = np.column_stack([timestamps, motion(T * tick), tick + 17])
     recording = read_recording(write(tmp_path / "a.csv", table, HEADER.replace("gz\n", "gz,counter\n")))
     assert recording.sampling.is_even

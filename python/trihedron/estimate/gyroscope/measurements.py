@@ -77,6 +77,12 @@ class MoveMeasurements:
         return self.clipped_s > LONGEST_BRIDGE_S
 
     @property
+    def angle_variance(self) -> FloatArray:
+        """(m, 3) variance of the integrated readings by those that are bridged or rounded, (raw unit · s)²."""
+        of_moves = [self.reading_variance[a:b].sum(axis=0) for a, b in self.edges]
+        return np.array(of_moves) * self.nominal_step_s**2
+
+    @property
     def n_moves(self) -> int:
         """Number of moves."""
         return len(self.links)

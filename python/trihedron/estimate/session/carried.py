@@ -151,8 +151,9 @@ def move_quality(
 class Carried:
     """Tilt errors after moves: ``residual`` (m, 3) m/s² with its ``covariance`` (m, 3, 3), ``angle_deg`` (m,).
 
-    ``floor2`` (m,) is the variance across the vertical by poses, samples and the Earth's rotation, (m/s²)²; ``noise``
-    (m, 3, 3) the covariance by noise and Earth alone, without what the accelerometer leaves unexplained in the poses;
+    ``floor2`` (m,) is the variance across the vertical by poses, samples (bridged ones too) and the Earth's rotation,
+    (m/s²)²; ``noise`` (m, 3, 3) the covariance by noise and Earth alone, without what the accelerometer leaves
+    unexplained in the poses;
     ``up`` (m, 3) the unit vertical after a move, ``wrt_scale`` (m, 3, 9) and ``wrt_accelerometer`` (m, 3, 12) the
     derivatives of the residual by the gyro's S row by row, and by S and b of the accelerometer.
     """
@@ -196,7 +197,9 @@ def carried(
         noise,
     )  # fmt: skip
     earth = turned_with_earth(measured.latitude_deg, directions_of(start))
-    cov_rate += left_by_earth(wrt_room, earth)[:, None, None] * np.eye(3)
+    # Where in a turn the Earth, a bridge or rounding acts decides about which axis: any is as likely.
+    by_readings = np.einsum("mij,mj->m", S_w**2, measured.angle_variance) / 3.0
+    cov_rate += (left_by_earth(wrt_room, earth) + by_readings)[:, None, None] * np.eye(3)
     read = measured.reading[before], measured.reading[after]
     by_S = rotation[..., None] * read[0][:, None, None, :] - np.eye(3)[..., None] * read[1][:, None, None, :]
     wrt_accelerometer = np.concatenate([by_S.reshape(m, 3, 9), rotation - np.eye(3)], axis=2)
