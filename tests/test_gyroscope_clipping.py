@@ -188,8 +188,7 @@ def test_faces_of_a_coarse_accelerometer_lie_within_their_error_bars(logs):
         f = 9.81 * np.sign(faces)[:, None] * np.eye(3)[np.abs(faces) - 1]
         lean = 0.2 * rng.normal(size=(6, 2, 3)) * (f[::3, None] == 0.0)
         f += lean[:, [0, 1, 0]].reshape(18, 3)
-        places = f @ S_a.T + zero
-        values = np.array([np.round(p + 0.1 * rng.normal(size=(400, 3))).mean(axis=0) for p in places])
+        values = np.array([np.round(p + 0.1 * rng.normal(size=(400, 3))).mean(axis=0) for p in f @ S_a.T + zero])
         found, _ = calibrate_faces(values, np.full(3, np.sqrt(part)), 9.81, up=faces.tolist(), shared=np.full(3, part))
         S = np.linalg.inv(S_a)
         # The zero: no lean of a table reaches it, each face stands as it happens to.

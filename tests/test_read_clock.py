@@ -17,8 +17,7 @@ T = 0.0100237
 
 def numbers(seed, lost):
     """(N,) sample numbers with ``lost`` single samples missing, and the rows behind which they are."""
-    rng = np.random.default_rng(seed)
-    behind = np.sort(rng.choice(np.arange(50, N - 50, 40), lost, replace=False))
+    behind = np.sort(np.random.default_rng(seed).choice(np.arange(50, N - 50, 40), lost, replace=False))
     return np.arange(N) + np.searchsorted(behind, np.arange(N)), behind
 
 

@@ -194,6 +194,9 @@ def test_axes_of_both_sensors_that_turn_while_the_part_rests_are_serious(tmp_pat
 def test_a_clock_that_changes_its_rate_is_serious_unless_gravity_turns_so_too(tmp_path, is_true):
     t, force, rate = motion(n_poses=16)
     half = len(t) // 2
+    # At half the rate from there on: every second sample is lost, and its turn is not.
+    kept = np.r_[:half, half : len(t) : 2]
+    assert not serious(read_recording(written(tmp_path / "kept.csv", *table(t[kept], force[kept], rate[kept]))))
     timestamps = np.where(t < t[half], t, t[half] + 1.25 * (t - t[half]))
     if is_true:
         rate[half:] /= 1.25

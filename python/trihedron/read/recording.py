@@ -145,11 +145,13 @@ def _audited(
         judged = judge_accelerometer(sensors.accelerometer, windows, sensors.columns.accelerometer_unit, units[0])
         acc_unit = AccelerationUnit(judged.unit)
         findings += [*judged.findings, *_unnamed_gyro(sensors, rate)]
+    turned = sensors if any(one.code == "clock-jumped" for one in of_clock) else _with_lost_turns(sensors, rate)
     if sensors.gyroscope is not None:
-        judged = _judged_gyro(sensors, rate, windows, units[1], extremes["gyroscope"])
+        judged = _judged_gyro(sensors, turned, rate, windows, units[1], extremes["gyroscope"])
         gyr_unit = RateUnit(judged.unit)
         findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
-    changes = audit_orientation(sensors, rate)
+    changes = audit_orientation(turned, rate)
+    del turned  # a copy of all rates where samples were lost
     if changes:
         # A scale or axes that change have no one unit.
         findings = [*changes, *(one for one in findings if one.code != "unit-contradicted")]
@@ -191,13 +193,33 @@ def _audited(
     ).with_facts(facts)
 
 
+LONGEST_TURN_S = 0.1
+"""Longest time for which one reading stands where those behind it are lost: a hand turns at another rate later."""
+
+
+def _with_lost_turns(sensors: Sensors, rate_hz: float) -> Sensors:
+    """Sensors whose gyro readings are multiplied by the samples that each stands for, half of the lost ones beside it:
+    summed over rows they are the rotation."""
+    lost, rates = sensors.lost_behind, sensors.gyroscope
+    if rates is None or lost is None or not lost.any():
+        return sensors
+    half = 0.5 * np.minimum(lost, LONGEST_TURN_S * rate_hz)
+    return replace(sensors, gyroscope=rates * (1.0 + np.append(half, 0.0) + np.append(0.0, half))[:, None])
+
+
 def _judged_gyro(
-    sensors: Sensors, rate_hz: float, windows: Windows | None, given: str | RateUnit | None, extremes: Extremes
+    sensors: Sensors,
+    turned: Sensors,
+    rate_hz: float,
+    windows: Windows | None,
+    given: str | RateUnit | None,
+    extremes: Extremes,
 ) -> Judged:
-    """The gyro's unit, with findings from the rotation of gravity about the unit and the axes."""
+    """The gyro's unit, with findings from the rotation of gravity about the unit and the axes; ``turned`` are the
+    sensors with the turns of lost samples."""
     assert sensors.gyroscope is not None
     acc = sensors.accelerometer
-    turning = None if acc is None else turning_of(acc, sensors.gyroscope, rate_hz)
+    turning = None if acc is None or turned.gyroscope is None else turning_of(acc, turned.gyroscope, rate_hz)
     if turning is not None:
         turning = replace(turning, clock_is_weighed=any(was_weighed(one) for one in sensors.findings))
     clear = turning if turning is not None and turning.is_clear else None
