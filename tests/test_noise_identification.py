@@ -148,29 +148,29 @@ def test_the_best_averaging_time_lies_in_its_interval():
         # N²/τ + K²τ/3 is least at √3 N/K.
         inside += lower < math.sqrt(3.0) * 10.0 < upper
     assert inside >= 6  # of eight at 95 %: a probability of 0.994
-    white = in_time(rng, 36_000, 10.0, N=1e-2)
-    assert identify_noise(white, 10.0).axes[0].averaging_ends_s[1] == math.inf
+    assert identify_noise(in_time(rng, 36_000, 10.0, N=1e-2), 10.0).axes[0].averaging_ends_s[1] == math.inf
 
 
 def test_knocks_and_shaking_are_left_out_and_named(quiet):
     knocked = quiet.copy()
     knocked[1000] += 1.0
     knocked[200_000:200_005] -= 0.2
+    away = [np.arange(len(quiet)) / RATE - at for at in range(200, 3000, 300)]
+    ringing = quiet + 0.2 * sum(np.sin(40.0 * t) * np.exp(-5.0 * np.abs(t)) for t in away)
     shaken = quiet.copy()
     shaken[100_000:103_000] += 0.05 * np.random.default_rng(1).normal(size=3000)
-    for x, code in ((knocked, "log-impact"), (shaken, "log-motion")):
+    for x, first, code in ((knocked, 10, "log-impact"), (ringing, 200, "log-impact"), (shaken, 1015, "log-motion")):
         noise = identify_noise(x, RATE)
         assert codes(noise) >= {code, "stretches-excluded"}
         assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.01)
-        first = 10.0 if x is knocked else 1015.0
+        assert present(noise.axes[0]) == {"N", "K"}
         assert any(start <= first <= stop for start, stop in noise.excluded_s)
 
 
 @pytest.mark.parametrize(("white", "tilt", "is_moving"), [(0.004, 0.0, False), (0.05, 0.0, False), (0.004, 0.3, True)])
 def test_a_log_that_moves_is_not_to_be_trusted(white, tilt, is_moving):
     """Noise of 0.4 and 5 mg/√Hz beside a bias that warms by 0.1 g; a hand that tilts all the time makes no event."""
-    rng, n = np.random.default_rng(5), 12_000
-    t = np.arange(n) / RATE
+    rng, n, t = np.random.default_rng(5), 12_000, np.arange(12_000) / RATE
     angle = tilt * np.sin(2 * np.pi * 0.21 * t) * np.sin(2 * np.pi * 0.034 * t)
     force = 9.81 * np.column_stack([np.sin(angle), 0.1 * t / t[-1], np.cos(angle)])
     force += white * np.sqrt(RATE) * rng.normal(size=(n, 3))

@@ -70,8 +70,7 @@ def motion(taken_s, seed=5):
 
 @pytest.mark.parametrize("law", ["late", "scattered", "rounded"])
 def test_motion_shows_whether_samples_were_taken_evenly_or_when_stamped(tmp_path, law):
-    even = T * np.arange(N)
-    timestamps = arrival(np.arange(N), law, 2)
+    even, timestamps = T * np.arange(N), arrival(np.arange(N), law, 2)
     by_clock = read_recording(write(tmp_path / "a.csv", np.column_stack([timestamps, motion(even)]), HEADER))
     assert by_clock.sampling.is_even
     assert "even-clock" in codes(by_clock)

@@ -26,6 +26,7 @@ from trihedron.estimate.noise.screening import (
     steps_and_impacts,
     tail_error,
     turn_of_gravity,
+    with_tails,
 )
 from trihedron.estimate.noise.slow_changes import (
     MOSTLY,
@@ -209,6 +210,8 @@ class Channel:
         if is_level:
             louder = max(event.size for event in shocks)
             impacts, shocks = [one for one in impacts if not one.overlaps(shocks)], []
+        else:
+            impacts = with_tails(calm.column, impacts)
         findings = list(remarks.events(impacts, shocks, self.rate_hz, self.unit))
         cuts = merged([(e.start, e.stop) for e in (*shocks, *impacts)])
         share = sum(stop - start for start, stop in cuts) / len(self.column)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from trihedron.estimate.noise.slow_changes import EXPONENTIAL, WAVE
+from trihedron.ranges import merged
 from trihedron.records import Finding, NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
@@ -35,9 +36,8 @@ def events(impacts: Sequence[Event], shocks: Sequence[Event], rate_hz: float, un
     """Findings for impacts and shaking of one axis; the largest impact with its time."""
     if impacts:
         worst = max(impacts, key=lambda e: abs(e.size))
-        yield Finding.of(
-            "log-impact", n_impacts=len(impacts), impact=worst.size, unit=unit, time_s=worst.start / rate_hz
-        )
+        count, start_s = len(merged((e.start, e.stop) for e in impacts)), worst.start / rate_hz
+        yield Finding.of("log-impact", n_impacts=count, impact=worst.size, unit=unit, time_s=start_s)
     if shocks:
         total = sum(e.stop - e.start for e in shocks) / rate_hz
         yield Finding.of(

@@ -17,6 +17,7 @@ from trihedron import _core
 from trihedron.arrays import TINY, BoolArray, FloatArray, IntArray
 from trihedron.channel_facts.limits import share_at_limits
 from trihedron.channel_facts.static_axes import adc_step
+from trihedron.estimate.noise.gaps import bridged
 from trihedron.probability import RARE_ALARM
 from trihedron.quantiles import MAD_TO_SIGMA
 from trihedron.ranges import edges_of, merged
@@ -93,6 +94,25 @@ def steps_and_impacts(x: FloatArray) -> tuple[list[Event], list[Event]]:
             impacts.append(Event(start, stop, jump))
             taken.append((start, stop))
     return sorted(steps, key=lambda e: e.start), sorted(impacts, key=lambda e: e.start)
+
+
+def with_tails(rest: FloatArray, impacts: list[Event]) -> list[Event]:
+    """The ``impacts`` and what rings beside them, which they hide, up to the longest event: of a channel without the
+    impacts, ``rest`` (n,), in which these are marked too."""
+    impacts = list(impacts)
+    while impacts:
+        found = steps_and_impacts(bridged(rest))[1]
+        spans = merged((e.start, e.stop) for e in (*impacts, *found))
+        short = [(a, b) for a, b in spans if b - a <= len(rest) // LONGEST_EVENT]
+        found = [e for e in found if e.overlaps(impacts) and any(a <= e.start < b for a, b in short)]
+        # The line that bridges an impact may look like one.
+        found = [e for e in found if np.isfinite(rest[e.start : e.stop]).any()]
+        if not found:
+            break
+        for one in found:
+            rest[one.start : one.stop] = np.nan
+        impacts += found
+    return impacts
 
 
 def _level_change(x: FloatArray, at: int, width: int, reach: int) -> float:
